@@ -1,0 +1,70 @@
+"""The one program ``lfstereo``: finds the command, runs it, turns errors into exit codes."""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import sys
+import traceback
+from collections.abc import Sequence
+
+from lfstereo import __version__
+from lfstereo.errors import LfstereoError
+
+COMMANDS: dict[str, tuple[str, str]] = {
+    "info": (
+        "lfstereo.cli.info",
+        "print what a capture holds: camera, lens, lenslet array, levels, sections",
+    ),
+    "simulate": ("lfstereo.cli.simulate", "make a dual-Illum capture of a scene with known depth"),
+    "decode": ("lfstereo.cli.decode", "raw capture to 4-D light field"),
+    "run": ("lfstereo.cli.run", "two captures to disparity, depth, all-in-focus image and point cloud"),
+    "train": ("lfstereo.cli.train", "train a network from a recipe"),
+}
+"""Command name -> module with ``configure(parser)`` and ``run(arguments) -> int``, and its help line."""
+
+
+def build_parser(argv: Sequence[str]) -> argparse.ArgumentParser:
+    """Build the parser; only the module of the command named in ``argv`` is imported."""
+    parser = argparse.ArgumentParser(
+        prog="lfstereo", description="Depth from pairs of Lytro light-field captures."
+    )
+    parser.add_argument("--version", action="version", version=f"lfstereo {__version__}")
+    commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
+    wanted = next((word for word in argv if not word.startswith("-")), None)
+    for name, (module, text) in COMMANDS.items():
+        sub = commands.add_parser(name, help=text, description=text[0].upper() + text[1:] + ".")
+        if name == wanted:
+            importlib.import_module(module).configure(sub)
+    return parser
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the program and return its exit code.
+
+    0 done, 1 bug, 2 usage, 3 bad input, 4 result not trustworthy, 5 part of a batch failed, 130 interrupted.
+    """
+    words = list(sys.argv[1:] if argv is None else argv)
+    arguments = build_parser(words).parse_args(words)
+    try:
+        return int(importlib.import_module(COMMANDS[arguments.command][0]).run(arguments))
+    except LfstereoError as error:
+        print(f"lfstereo {arguments.command}: {error}", file=sys.stderr)
+        return error.exit_code
+    except KeyboardInterrupt:
+        print(f"lfstereo {arguments.command}: interrupted; nothing partial was left", file=sys.stderr)
+        return 130
+    except BrokenPipeError:
+        sys.stderr.close()
+        return 0
+    except Exception:
+        traceback.print_exc()
+        print(
+            f"lfstereo {arguments.command}: this is a bug; please report it with the lines above",
+            file=sys.stderr,
+        )
+        return 1
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

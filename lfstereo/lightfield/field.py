@@ -1,0 +1,50 @@
+"""The 4-D light field, the value that everything after the decode works on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from lfstereo.arrays import UInt8, Views, check_shape
+from lfstereo.errors import ShapeError
+
+
+@dataclass(frozen=True, slots=True)
+class ViewSampling:
+    """Where the samples of a light field lie on the sensor; ties it to a rig whatever grid was fitted."""
+
+    origin_px: tuple[float, float]
+    """(x, y) on the sensor of view pixel (0, 0) of the centre view."""
+    step_px: tuple[float, float]
+    """(x, y) sensor px per view pixel along u and along v; the lattice rotation has been taken out."""
+    rotation_rad: float
+    """Rotation of the view's u axis on the sensor, x towards y."""
+    view_step_px: float
+    """Sensor px between neighbouring views, inside a micro-image."""
+
+
+@dataclass(frozen=True, slots=True)
+class LightField:
+    """Views of one scene from a regular grid of positions in the aperture."""
+
+    views: Views
+    """``(T, S, V, U, 3)`` float32 linear RGB, 1.0 = diffuse white, values above 1 kept."""
+    weight: UInt8 | None
+    """``(T, S, V, U)`` confidence of each sample, 255 = full; ``None`` where all count alike."""
+    sampling: ViewSampling | None
+    """``None`` for views that never were a lenslet image: then a rig speaks of view pixels."""
+    serial: str
+    """Camera serial number, empty where unknown."""
+    source: str
+    """File or folder it came from, for messages."""
+
+    def __post_init__(self) -> None:
+        check_shape(f"{self.source}: views", self.views, (None, None, None, None, 3))
+        if self.weight is not None and self.weight.shape != self.views.shape[:4]:
+            raise ShapeError(
+                f"{self.source}: weight has shape {self.weight.shape}, expected {self.views.shape[:4]} as the views"
+            )
+
+    @property
+    def centre(self) -> tuple[int, int]:
+        """Row and column ``(t0, s0)`` of the centre view."""
+        return self.views.shape[0] // 2, self.views.shape[1] // 2

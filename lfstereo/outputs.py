@@ -1,0 +1,91 @@
+"""Results appear whole or not at all: write beside, then rename."""
+
+from __future__ import annotations
+
+import errno
+import os
+import secrets
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from lfstereo.errors import OutputError
+
+
+@contextmanager
+def atomic_file(target: Path, force: bool = False) -> Iterator[Path]:
+    """Give a scratch path beside ``target``; rename it to ``target`` when the block ends without an error.
+
+    Raises
+    ------
+    OutputError
+        If ``target`` exists and ``force`` is not set, or it cannot be written (disk full, read-only).
+    """
+    _refuse_existing(target, force)
+    if target.is_dir():
+        raise OutputError(f"{target}: is a folder, expected a file name; give another output path")
+    scratch = _scratch_path(target)
+    try:
+        with _explained(target):
+            yield scratch
+            os.replace(scratch, target)
+    finally:
+        scratch.unlink(missing_ok=True)
+
+
+@contextmanager
+def atomic_folder(target: Path, force: bool = False) -> Iterator[Path]:
+    """Give a scratch folder beside ``target``; rename it to ``target`` when the block ends without an error.
+
+    Raises
+    ------
+    OutputError
+        If ``target`` exists and ``force`` is not set, or it cannot be written (disk full, read-only).
+    """
+    _refuse_existing(target, force)
+    if target.exists() and not target.is_dir():
+        raise OutputError(f"{target}: is a file, expected a folder; give another output path")
+    scratch = _scratch_path(target)
+    try:
+        with _explained(target):
+            scratch.mkdir(parents=True)
+            yield scratch
+            _swap(scratch, target)
+    finally:
+        shutil.rmtree(scratch, ignore_errors=True)
+
+
+def _swap(scratch: Path, target: Path) -> None:
+    if not target.exists():
+        os.replace(scratch, target)
+        return
+    old = _scratch_path(target)
+    os.replace(target, old)
+    os.replace(scratch, target)
+    shutil.rmtree(old, ignore_errors=True)
+
+
+def _scratch_path(target: Path) -> Path:
+    return target.parent / f".{target.name}.{secrets.token_hex(4)}.partial"
+
+
+def _refuse_existing(target: Path, force: bool) -> None:
+    if target.exists() and not force:
+        raise OutputError(f"{target}: exists already; give another output path, or --force to replace it")
+
+
+@contextmanager
+def _explained(target: Path) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        if error.errno in (errno.ENOSPC, errno.EDQUOT):
+            raise OutputError(
+                f"{target}: the disk is full; nothing was kept, free some space and run again"
+            ) from error
+        if error.errno in (errno.EACCES, errno.EPERM, errno.EROFS, errno.ENOENT, errno.ENOTDIR):
+            raise OutputError(
+                f"{target}: cannot be written ({error.strerror}); choose another place"
+            ) from error
+        raise
