@@ -28,6 +28,4 @@ def asset_folder(kind: str) -> Path:
     for folder in (_PACKAGE / "_assets" / kind, _PACKAGE.parent / kind):
         if folder.is_dir():
             return folder
-    raise AssetError(
-        f"{_PACKAGE}: the folder '{kind}' is missing from this installation; install lfstereo again"
-    )
+    raise AssetError(f"{_PACKAGE}: the folder '{kind}' is missing from this installation; install lfstereo again")

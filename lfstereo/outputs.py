@@ -81,11 +81,7 @@ def _explained(target: Path) -> Iterator[None]:
         yield
     except OSError as error:
         if error.errno in (errno.ENOSPC, errno.EDQUOT):
-            raise OutputError(
-                f"{target}: the disk is full; nothing was kept, free some space and run again"
-            ) from error
+            raise OutputError(f"{target}: the disk is full; nothing was kept, free some space and run again") from error
         if error.errno in (errno.EACCES, errno.EPERM, errno.EROFS, errno.ENOENT, errno.ENOTDIR):
-            raise OutputError(
-                f"{target}: cannot be written ({error.strerror}); choose another place"
-            ) from error
+            raise OutputError(f"{target}: cannot be written ({error.strerror}); choose another place") from error
         raise

@@ -20,9 +20,7 @@ def progress_bar(label: str) -> Iterator[Progress]:
     """Draw one bar on stderr for the stage run inside the ``with`` block."""
     from tqdm import tqdm
 
-    with tqdm(
-        desc=f"{label:<22}", unit="", file=sys.stderr, total=1, bar_format="{desc}{bar:24} {elapsed}"
-    ) as bar:
+    with tqdm(desc=f"{label:<22}", unit="", file=sys.stderr, total=1, bar_format="{desc}{bar:24} {elapsed}") as bar:
 
         def report(done: int, total: int) -> None:
             bar.total = total

@@ -26,9 +26,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
 
 def build_parser(argv: Sequence[str]) -> argparse.ArgumentParser:
     """Build the parser; only the module of the command named in ``argv`` is imported."""
-    parser = argparse.ArgumentParser(
-        prog="lfstereo", description="Depth from pairs of Lytro light-field captures."
-    )
+    parser = argparse.ArgumentParser(prog="lfstereo", description="Depth from pairs of Lytro light-field captures.")
     parser.add_argument("--version", action="version", version=f"lfstereo {__version__}")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
     wanted = next((word for word in argv if not word.startswith("-")), None)

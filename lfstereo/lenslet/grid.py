@@ -43,4 +43,5 @@ class LensletGrid:
         shifted = (np.arange(self.rows)[:, None] + self.first_shifted_row) % 2 == 0
         u = u + 0.5 * shifted
         step_u, step_v = np.asarray(self.step_u_px), np.asarray(self.step_v_px)
-        return np.asarray(self.origin_px) + u[..., None] * step_u + v[..., None] * step_v
+        centres: Float64 = np.asarray(self.origin_px) + u[..., None] * step_u + v[..., None] * step_v
+        return centres
