@@ -1,0 +1,169 @@
+"""The recipe: from two captures to a disparity map, one call per stage."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from lfstereo.arrays import Bool, Float32, Rgb
+from lfstereo.container import read_capture
+from lfstereo.conventions import SLICES_DEFAULT
+from lfstereo.depth.disparity import DisparityMap
+from lfstereo.errors import AssetError, ConfigError, ShapeError
+from lfstereo.focus.refocus import render_stack, slice_disparities
+from lfstereo.focus.stack import FocalStack
+from lfstereo.lenslet.white import find_white_image
+from lfstereo.lightfield.decode import decode
+from lfstereo.lightfield.field import LightField
+from lfstereo.lightfield.store import read_light_field
+from lfstereo.options import option
+from lfstereo.progress import Progress, StageClock, silent
+from lfstereo.rig.rectify import (
+    RectifiedGeometry,
+    Side,
+    field_of_view,
+    rectified_geometry,
+    rectify,
+    view_baseline_m,
+    view_homography,
+)
+from lfstereo.rig.rig import StereoRig
+
+if TYPE_CHECKING:
+    from lfstereo.network.estimate import Network
+
+CAPTURE_SUFFIXES = (".lfr", ".lfp", ".raw")
+
+
+@dataclass(frozen=True, slots=True)
+class RunOptions:
+    """How a pair is turned into depth."""
+
+    slices: int = option(SLICES_DEFAULT, "slices of each focal stack")
+    model: str = option("bdffnet-r16-v1", "name of a shipped model, or its folder")
+    device: Literal["auto", "cpu", "cuda"] = option("auto", "where the network runs")
+
+
+@dataclass(frozen=True, slots=True)
+class SideResult:
+    """What one camera of the pair contributes."""
+
+    stack: FocalStack
+    centre_view: Rgb
+    """``(V, U, 3)`` rectified centre view, linear RGB."""
+    seen: Bool
+    """``(V, U)``: inside this camera's own field of view."""
+    serial: str
+
+
+@dataclass(frozen=True, slots=True)
+class PairResult:
+    """Everything a run computed, before it is written."""
+
+    map: DisparityMap
+    left: SideResult
+    right: SideResult
+    geometry: RectifiedGeometry
+
+
+def run_pair(
+    left: Path, right: Path, rig: StereoRig, whites: Path | None, options: RunOptions, clock: StageClock
+) -> PairResult:
+    """Turn two captures, decoded light fields or view folders into disparity.
+
+    Parameters
+    ----------
+    left, right
+        An LFR/LFP/RAW capture, an ``.h5`` light field or a folder of views each.
+    rig
+        The calibrated rig that took them.
+    whites
+        Folder of white images, needed for raw captures.
+
+    Raises
+    ------
+    InputError
+        If a file, the rig or the white images cannot be used, or the two do not fit together.
+    QualityError
+        If a lenslet grid or the rig's geometry cannot be trusted.
+    """
+    from lfstereo.network.estimate import estimate_disparity, load_network
+
+    if options.slices < 2:
+        raise ConfigError(f"slices = {options.slices}, expected at least 2")
+    network = load_network(options.model, options.device)
+    geometry = rectified_geometry(rig)
+    sides: dict[Side, SideResult] = {}
+    shape: tuple[int, ...] | None = None
+    for side, path in (("left", left), ("right", right)):
+        with clock.stage(f"decode {side}") as progress:
+            light_field = open_light_field(path, whites, progress)
+        if shape is not None and light_field.views.shape != shape:
+            raise ShapeError(
+                f"{path}: light field of {light_field.views.shape}, but {left} has {shape}; decode both the same way"
+            )
+        shape = light_field.views.shape
+        sides[side] = focus_side(light_field, rig, geometry, side, options, clock)  # type: ignore[index,arg-type]
+        del light_field
+    with clock.stage("disparity") as progress:
+        found = estimate_disparity(sides["left"].stack, sides["right"].stack, network, progress)
+    valid = found.valid & common_field(found.disparity, sides["left"].seen, sides["right"].seen)
+    found = DisparityMap(disparity=found.disparity, valid=valid, all_in_focus=found.all_in_focus)
+    return PairResult(map=found, left=sides["left"], right=sides["right"], geometry=geometry)
+
+
+def open_light_field(path: Path, whites: Path | None, progress: Progress = silent) -> LightField:
+    """Decode a raw capture, or read a light field that already is decoded.
+
+    Raises
+    ------
+    AssetError
+        If a raw capture is given without a folder of white images.
+    """
+    if path.is_dir() or path.suffix.lower() not in CAPTURE_SUFFIXES:
+        return read_light_field(path)
+    capture = read_capture(path)
+    if whites is None:
+        raise AssetError(f"{path}: a raw capture needs the camera's white images; give their folder with --whites")
+    return decode(capture, find_white_image(whites, capture.metadata), progress=progress)
+
+
+def focus_side(
+    light_field: LightField,
+    rig: StereoRig,
+    geometry: RectifiedGeometry,
+    side: Side,
+    options: RunOptions,
+    clock: StageClock,
+) -> SideResult:
+    """Rectify one light field and render its focal stack at the pair's common disparities."""
+    camera = rig.left if side == "left" else rig.right
+    t0, s0 = light_field.centre
+    homography = view_homography(light_field, camera, geometry, side, t0, s0)
+    seen = field_of_view(light_field.views.shape[2:4], homography, geometry.size)
+    step_m = view_baseline_m(light_field, camera)
+    views_across = max(light_field.views.shape[:2])
+    with clock.stage(f"rectify {side}") as progress:
+        rectified = rectify(light_field, rig, geometry, side, progress)
+    with clock.stage(f"focal stack {side}") as progress:
+        stack = render_stack(
+            rectified,
+            slice_disparities(geometry.disparity_max_px, 0.0, options.slices),
+            geometry.slope_from_disparity(step_m),
+            aperture_ratio=views_across * step_m / rig.baseline_m,
+            progress=progress,
+        )
+    return SideResult(stack=stack, centre_view=rectified.views[t0, s0].copy(), seen=seen, serial=light_field.serial)
+
+
+def common_field(disparity: Float32, seen_left: Bool, seen_right: Bool) -> Bool:
+    """Return where the left view shows what the right camera's field of view holds too, ``(V, U)``."""
+    rows, columns = disparity.shape
+    x_right = np.rint(np.arange(columns) - disparity).astype(np.intp)
+    inside = (x_right >= 0) & (x_right < columns)
+    hit: Bool = seen_right[np.arange(rows)[:, None], np.clip(x_right, 0, columns - 1)]
+    both: Bool = seen_left & inside & hit
+    return both
