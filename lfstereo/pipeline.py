@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -31,9 +31,6 @@ from lfstereo.rig.rectify import (
     view_homography,
 )
 from lfstereo.rig.rig import StereoRig
-
-if TYPE_CHECKING:
-    from lfstereo.network.estimate import Network
 
 CAPTURE_SUFFIXES = (".lfr", ".lfp", ".raw")
 

@@ -1,0 +1,44 @@
+# Two commands do everything on a fresh machine with Python 3.11 or newer:
+#   make demo    simulate a pair of captures and turn it into depth
+#   make test    lint, types, tests, wheel
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+DEMO := demo
+
+.PHONY: demo test lint types tests wheel clean
+
+demo: $(VENV)/.installed
+	$(BIN)/lfstereo simulate -o $(DEMO)/capture --force
+	$(BIN)/lfstereo run $(DEMO)/capture/left.LFR $(DEMO)/capture/right.LFR --rig $(DEMO)/capture/rig.toml \
+		--whites $(DEMO)/capture/whites --truth $(DEMO)/capture/truth -o $(DEMO)/result --force
+
+test: lint types tests wheel
+
+lint: $(VENV)/.installed-dev
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+
+types: $(VENV)/.installed-dev
+	$(BIN)/mypy
+
+tests: $(VENV)/.installed-dev
+	$(BIN)/python -m pytest
+
+wheel: $(VENV)/.installed-dev
+	$(BIN)/python -m build --no-isolation --outdir build/dist .
+
+$(VENV)/bin/python:
+	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "lfstereo needs Python 3.11 or newer; set PYTHON=")'
+	$(PYTHON) -m venv $(VENV)
+
+$(VENV)/.installed: $(VENV)/bin/python pyproject.toml
+	$(BIN)/python -m pip install --quiet --prefer-binary --editable .
+	touch $@
+
+$(VENV)/.installed-dev: $(VENV)/bin/python pyproject.toml
+	$(BIN)/python -m pip install --quiet --prefer-binary --editable '.[dev]'
+	touch $@ $(VENV)/.installed
+
+clean:
+	rm -rf build dist $(DEMO)
