@@ -13,6 +13,18 @@ from pathlib import Path
 from lfstereo.errors import OutputError
 
 
+def check_absent(target: Path, force: bool) -> None:
+    """Refuse an output that exists already, before any work is done.
+
+    Raises
+    ------
+    OutputError
+        If ``target`` exists and ``force`` is not set.
+    """
+    if target.exists() and not force:
+        raise OutputError(f"{target}: exists already; give another output path, or --force to replace it")
+
+
 @contextmanager
 def atomic_file(target: Path, force: bool = False) -> Iterator[Path]:
     """Give a scratch path beside ``target``; rename it to ``target`` when the block ends without an error.
@@ -22,7 +34,7 @@ def atomic_file(target: Path, force: bool = False) -> Iterator[Path]:
     OutputError
         If ``target`` exists and ``force`` is not set, or it cannot be written (disk full, read-only).
     """
-    _refuse_existing(target, force)
+    check_absent(target, force)
     if target.is_dir():
         raise OutputError(f"{target}: is a folder, expected a file name; give another output path")
     scratch = _scratch_path(target)
@@ -43,7 +55,7 @@ def atomic_folder(target: Path, force: bool = False) -> Iterator[Path]:
     OutputError
         If ``target`` exists and ``force`` is not set, or it cannot be written (disk full, read-only).
     """
-    _refuse_existing(target, force)
+    check_absent(target, force)
     if target.exists() and not target.is_dir():
         raise OutputError(f"{target}: is a file, expected a folder; give another output path")
     scratch = _scratch_path(target)
@@ -68,11 +80,6 @@ def _swap(scratch: Path, target: Path) -> None:
 
 def _scratch_path(target: Path) -> Path:
     return target.parent / f".{target.name}.{secrets.token_hex(4)}.partial"
-
-
-def _refuse_existing(target: Path, force: bool) -> None:
-    if target.exists() and not force:
-        raise OutputError(f"{target}: exists already; give another output path, or --force to replace it")
 
 
 @contextmanager
