@@ -1,1 +1,10 @@
+"""Stage 1: bytes of a file to a raw frame with its metadata, and back."""
 
+from __future__ import annotations
+
+from lfstereo.container.capture import Capture
+from lfstereo.container.format import Container
+from lfstereo.container.metadata import FrameMetadata
+from lfstereo.container.writer import write_capture
+
+__all__ = ["Capture", "Container", "FrameMetadata", "write_capture"]
