@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from lfstereo.container.capture import Capture
+from lfstereo.container.capture import Capture, read_capture
 from lfstereo.container.format import Container
 from lfstereo.container.metadata import FrameMetadata
+from lfstereo.container.reader import read_container
 from lfstereo.container.writer import write_capture
 
-__all__ = ["Capture", "Container", "FrameMetadata", "write_capture"]
+__all__ = ["Capture", "Container", "FrameMetadata", "read_capture", "read_container", "write_capture"]

@@ -31,6 +31,8 @@ MAGICS: dict[bytes, SectionKind] = {b"\x89LFM\r\n\x1a\n": "toc", b"\x89LFC\r\n\x
 SECTION_VERSION = b"\x00\x00\x00\x00"
 NAME_LENGTH = 45
 NAME_PADDING = bytes(35)
+EMPTY_SHA1 = hashlib.sha1(b"", usedforsecurity=False).hexdigest()
+"""The name of a section of length zero, which does not state it."""
 HEAD_LENGTH = 16
 """Bytes of magic, version and length."""
 DATA_START = HEAD_LENGTH + NAME_LENGTH + len(NAME_PADDING)
@@ -44,7 +46,7 @@ class Section:
 
     kind: SectionKind
     sha1: str
-    """40 hexadecimal digits in lower case, as the section's head states them; empty for an empty section."""
+    """40 hexadecimal digits in lower case, as the section's head states them."""
     offset: int
     """Byte of the file at which the section's head starts."""
     length: int
@@ -74,7 +76,7 @@ class Container:
 
     def find(self, name: str) -> Section | None:
         """Return the section with a name such as ``sha1-0360f8…``, or None where the file has none."""
-        wanted = name.strip().lower().removeprefix("sha1-")
+        wanted = name.lower().removeprefix("sha1-")
         return next((s for s in self.sections if s.sha1 == wanted), None)
 
     def read(self, section: Section) -> bytes:
@@ -87,7 +89,7 @@ class Container:
         """
         data = self.read_unverified(section)
         found = hashlib.sha1(data, usedforsecurity=False).hexdigest()
-        if section.length and found != section.sha1:
+        if found != section.sha1:
             raise ContainerError(
                 f"{self.path}: byte {section.data_offset}: found {section.length} bytes with SHA-1 {found}, expected "
                 f"{section.sha1}; the file is damaged, copy it again from the camera"
@@ -126,8 +128,12 @@ def section_bytes(kind: SectionKind, data: Payload) -> Iterator[Payload]:
     ([96, 3, 13], b'sha1-a9993e364')
     """
     magic = next(m for m, k in MAGICS.items() if k == kind)
-    sha1 = hashlib.sha1(data, usedforsecurity=False).hexdigest()
     length = len(data)
-    yield magic + SECTION_VERSION + struct.pack(">I", length) + f"sha1-{sha1}".encode("ascii") + NAME_PADDING
+    head = magic + SECTION_VERSION + struct.pack(">I", length)
+    if not length:
+        yield head
+        return
+    sha1 = hashlib.sha1(data, usedforsecurity=False).hexdigest()
+    yield head + f"sha1-{sha1}".encode("ascii") + NAME_PADDING
     yield data
     yield bytes(-(DATA_START + length) % ALIGNMENT)

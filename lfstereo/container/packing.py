@@ -53,6 +53,22 @@ def packed_size(width: int, height: int, bits: int, endianness: str, where: str)
     return groups * group_bytes
 
 
+def check_packed_size(found: int, width: int, height: int, bits: int, endianness: str, where: str) -> None:
+    """Refuse a number of bytes that is not what a packed frame takes.
+
+    Raises
+    ------
+    ContainerError
+        If the number differs, or the packing is unknown.
+    """
+    expected = packed_size(width, height, bits, endianness, where)
+    if found != expected:
+        raise ContainerError(
+            f"{where}: found a raw frame of {found} bytes, expected {expected} for {width} x {height} pixels of "
+            f"{bits} bits; give the complete file with its own metadata"
+        )
+
+
 def unpack(data: bytes | memoryview, width: int, height: int, bits: int, endianness: str, where: str) -> Mosaic:
     """Unpack the bytes of a raw frame into its pixels.
 
@@ -93,13 +109,8 @@ def unpack(data: bytes | memoryview, width: int, height: int, bits: int, endiann
     >>> [hex(p) for p in unpack(bytes([0x12, 0x34, 0x56]), 2, 1, 12, "big", "example")[0]]
     ['0x123', '0x456']
     """
-    expected = packed_size(width, height, bits, endianness, where)
     raw = np.frombuffer(data, dtype=np.uint8)
-    if raw.size != expected:
-        raise ContainerError(
-            f"{where}: found a raw frame of {raw.size} bytes, expected {expected} for {width} x {height} pixels of "
-            f"{bits} bits; give the complete file and its own metadata"
-        )
+    check_packed_size(raw.size, width, height, bits, endianness, where)
     if bits == 8:
         return raw.reshape(height, width).astype(np.uint16)
     if bits == 16:
