@@ -64,6 +64,7 @@ class PairResult:
     left: SideResult
     right: SideResult
     geometry: RectifiedGeometry
+    weights_sha256: str
 
 
 def run_pair(
@@ -109,7 +110,13 @@ def run_pair(
         found = estimate_disparity(sides["left"].stack, sides["right"].stack, network, progress)
     valid = found.valid & common_field(found.disparity, sides["left"].seen, sides["right"].seen)
     found = DisparityMap(disparity=found.disparity, valid=valid, all_in_focus=found.all_in_focus)
-    return PairResult(map=found, left=sides["left"], right=sides["right"], geometry=geometry)
+    return PairResult(
+        map=found,
+        left=sides["left"],
+        right=sides["right"],
+        geometry=geometry,
+        weights_sha256=network.card.sha256,
+    )
 
 
 def open_light_field(path: Path, whites: Path | None, progress: Progress = silent) -> LightField:
