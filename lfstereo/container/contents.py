@@ -81,7 +81,7 @@ def frame_section(container: Container, key: str) -> Section:
         )
     raise ContainerError(
         f"{container.path}: byte {container.size}: the file ends here, expected the section {name} that the table of "
-        f"contents names as the frame's {key}; the file is cut off, copy it again from the camera"
+        f"contents names as the frame's {key}; the file is cut off or damaged, copy it again from the camera"
     )
 
 

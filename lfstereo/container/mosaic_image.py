@@ -99,10 +99,12 @@ def _read_pixels(path: Path) -> UInt8 | UInt16:
 
     if path.suffix.lower() not in IMAGE_SUFFIXES:
         raise ContainerError(f"{path}: found the suffix '{path.suffix}', expected one of {', '.join(IMAGE_SUFFIXES)}")
-    if not path.is_file():
-        raise ContainerError(f"{path}: cannot be read (no such file); give the path of a JPEG, PNG or TIFF")
     try:
-        pixels = np.asarray(iio.imread(path))
+        data = path.read_bytes()
+    except OSError as error:
+        raise ContainerError(f"{path}: cannot be read ({error.strerror}); give a JPEG, PNG or TIFF") from error
+    try:
+        pixels = np.asarray(iio.imread(data, extension=path.suffix.lower()))
     except Exception as error:  # every decoder has its own kinds
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise ContainerError(
