@@ -1,0 +1,180 @@
+"""Stereo-Net: two all-in-focus images to the disparity of the left one.
+
+``fusion = "concat"`` is the paper's reading: both images concatenated, a stem to half resolution and two stacked
+hourglasses of depth 5, a prediction after each. Concatenation must learn what "the same point" means, which takes far
+more training than an hour of a processor gives.
+
+``fusion = "correlation"`` deviates on purpose: the stem runs on each image by itself (siamese) down to a quarter of the
+resolution, a group-wise correlation over 0 to 104 px replaces the concatenation, and the same two hourglasses (depth 4,
+which reaches the same 1/64 of the resolution) work on that volume together with the left features. The disparity
+is the expected bin; a small refinement at half resolution brings back the edges of the left image.
+
+References
+----------
+Guo, Chen, Li, Yang, Yu, "Deep Eyes: Binocular Depth-from-Focus on Focal Stack Pairs" (2017), Stereo-Net.
+Newell, Yang, Deng, "Stacked hourglass networks for human pose estimation" (2016).
+Guo et al., "Group-wise correlation stereo network" (2019), eq. 2 (the correlation variant).
+Kendall et al., "End-to-end learning of geometry and context for deep stereo regression" (2017), eq. 1 (soft argmin).
+Teed, Deng, "RAFT" (2020), section 3.3 (convex upsampling).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import torch
+import torch.nn.functional as F
+from torch import Tensor, nn
+
+from lfstereo.network.blocks import ConvBlock, DeconvBlock, Hourglass, Residual, initialise
+from lfstereo.network.volume import VolumeAggregation, group_correlation, soft_argmax, warp_right
+
+BIN_PX = 4
+BINS = 27
+SEARCH_PX = float(BIN_PX * (BINS - 1))
+"""Largest disparity (px) that the correlation variant can find."""
+GROUPS = 8
+
+
+@dataclass(frozen=True, slots=True)
+class Prediction:
+    """What a disparity network returns."""
+
+    maps: tuple[Tensor, ...]
+    """Disparity / 100 px, ``(B, 1, H, W)`` each, from the first stage to the final one."""
+    logits: tuple[Tensor, ...] = ()
+    """Scores of the disparity bins, ``(B, bins, H / 4, W / 4)`` each; empty for networks without bins."""
+
+    @property
+    def final(self) -> Tensor:
+        """The last map."""
+        return self.maps[-1]
+
+
+class StereoNet(nn.Module):
+    """Two images ``(B, 3, H, W)`` in [0, 1] to disparity; ``H`` and ``W`` multiples of 64.
+
+    Parameters
+    ----------
+    channels
+        Width C of the hourglasses; the stem has C / 2 at half resolution.
+    fusion
+        How the two images meet; see the module's text.
+    """
+
+    def __init__(self, channels: int = 64, fusion: Literal["concat", "correlation"] = "correlation") -> None:
+        super().__init__()
+        self.body: nn.Module = _Concatenated(channels) if fusion == "concat" else _Correlated(channels)
+        initialise(self)
+        if isinstance(self.body, _Correlated):
+            self.body.refine.start_small()
+
+    def forward(self, left: Tensor, right: Tensor) -> Prediction:
+        """Return the predictions of every stage."""
+        out: Prediction = self.body(left - 0.5, right - 0.5)
+        return out
+
+
+class _Concatenated(nn.Module):
+    def __init__(self, channels: int) -> None:
+        super().__init__()
+        half = channels // 2
+        self.stem = nn.Sequential(ConvBlock(6, half, 7, 2), Residual(half, half), Residual(half, channels))
+        self.glasses = nn.ModuleList(
+            nn.Sequential(Hourglass(channels, 5), Residual(channels, channels), ConvBlock(channels, channels, 1))
+            for _ in range(2)
+        )
+        self.heads = nn.ModuleList(
+            nn.Sequential(DeconvBlock(channels, half, 2), nn.Conv2d(half, 1, 3, 1, 1)) for _ in range(2)
+        )
+        self.back_features = nn.Conv2d(channels, channels, 1)
+        self.back_map = nn.Conv2d(1, channels, 2, 2)
+
+    def forward(self, left: Tensor, right: Tensor) -> Prediction:
+        x = self.stem(torch.cat((left, right), dim=1))
+        features = self.glasses[0](x)
+        first = self.heads[0](features)
+        second = self.heads[1](self.glasses[1](x + self.back_features(features) + self.back_map(first)))
+        return Prediction((first, second))
+
+
+class _Features(nn.Module):
+    """One image to features at 1/2 (C / 2 channels) and 1/4 (C channels) of the resolution."""
+
+    def __init__(self, channels: int) -> None:
+        super().__init__()
+        half = channels // 2
+        self.stem = nn.Sequential(ConvBlock(3, half, 7, 2), Residual(half, half))
+        self.quarter = nn.Sequential(ConvBlock(half, channels, 3, 2), Residual(channels, channels))
+        self.wide = nn.Sequential(
+            nn.MaxPool2d(2), Residual(channels, channels), Residual(channels, channels), DeconvBlock(channels, channels)
+        )
+        self.out = nn.Sequential(Residual(channels, channels), nn.Conv2d(channels, channels, 1))
+
+    def forward(self, image: Tensor) -> tuple[Tensor, Tensor]:
+        half = self.stem(image)
+        quarter = self.quarter(half)
+        return half, self.out(quarter + self.wide(quarter))
+
+
+class _Refinement(nn.Module):
+    """Quarter-resolution disparity to full resolution, guided by the images' half-resolution features."""
+
+    def __init__(self, half: int, channels: int) -> None:
+        super().__init__()
+        self.context = nn.Conv2d(channels, half, 1)
+        self.enter = ConvBlock(3 * half + 1, half)
+        self.body = nn.Sequential(Residual(half, half), ConvBlock(half, half), Residual(half, half))
+        self.residual = nn.Conv2d(half, 1, 3, 1, 1)
+        self.mask = nn.Conv2d(half, 4 * 9, 1)
+
+    def start_small(self) -> None:
+        """Begin as plain upsampling."""
+        for part in (self.residual, self.mask):
+            nn.init.normal_(part.weight, std=1e-3)
+
+    def forward(self, disparity: Tensor, context: Tensor, left: Tensor, right: Tensor) -> Tensor:
+        coarse = F.interpolate(disparity, scale_factor=2, mode="bilinear", align_corners=False)
+        context = F.interpolate(self.context(context), scale_factor=2, mode="bilinear", align_corners=False)
+        warped = warp_right(right, coarse * 50.0)
+        x = self.body(self.enter(torch.cat((left, left - warped, context, coarse), dim=1)))
+        return convex_upsample(coarse + 0.1 * self.residual(x), self.mask(x))
+
+
+def convex_upsample(small: Tensor, mask: Tensor) -> Tensor:
+    """Double the resolution: each new pixel is a convex mix of the nine old ones around it.
+
+    Parameters
+    ----------
+    small
+        ``(B, 1, h, w)``.
+    mask
+        ``(B, 36, h, w)`` logits: 9 neighbours for each of the 2 x 2 new pixels.
+    """
+    batch, _, h, w = small.shape
+    weights = F.softmax(mask.view(batch, 9, 4, h, w), dim=1)
+    neighbours = F.unfold(F.pad(small, (1, 1, 1, 1), mode="replicate"), 3).view(batch, 9, 1, h, w)
+    return F.pixel_shuffle((weights * neighbours).sum(1), 2)
+
+
+class _Correlated(nn.Module):
+    bin_values: Tensor
+
+    def __init__(self, channels: int) -> None:
+        super().__init__()
+        self.features = _Features(channels)
+        self.aggregate = VolumeAggregation(GROUPS, BINS, channels, channels, depth=4, stacks=2)
+        self.refine = _Refinement(channels // 2, channels)
+        values = torch.arange(BINS, dtype=torch.float32) * (BIN_PX / 100.0)
+        self.register_buffer("bin_values", values, persistent=False)
+
+    def forward(self, left: Tensor, right: Tensor) -> Prediction:
+        batch = left.shape[0]
+        half, quarter = self.features(torch.cat((left, right)))
+        volume = group_correlation(quarter[:batch], quarter[batch:], BINS, GROUPS)
+        logits, context = self.aggregate(volume, quarter[:batch])
+        coarse = [soft_argmax(scores, self.bin_values) for scores in logits]
+        final = self.refine(coarse[-1], context, half[:batch], half[batch:])
+        full = [F.interpolate(m, scale_factor=4, mode="bilinear", align_corners=False) for m in coarse]
+        return Prediction((*full, final), tuple(logits))

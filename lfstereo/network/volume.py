@@ -1,0 +1,115 @@
+"""Volumes over the disparity axis: matching, aggregation and the read-out of a disparity.
+
+A bin is a hypothesis "the disparity is b px". The same aggregation serves the stereo volume (27 bins of 4 px) and the
+focus volume (16 slices): three-dimensional convolutions share their weights along the disparity axis, a stack of
+hourglasses brings in the picture's context.
+"""
+
+from __future__ import annotations
+
+import torch
+import torch.nn.functional as F
+from torch import Tensor, nn
+
+from lfstereo.network.blocks import ConvBlock, ConvBlock3d, Hourglass, Residual
+
+
+def group_correlation(left: Tensor, right: Tensor, bins: int, groups: int) -> Tensor:
+    """Correlate left features with right features at every shift.
+
+    Parameters
+    ----------
+    left, right
+        ``(B, C, h, w)`` features.
+    bins
+        Shifts 0 to ``bins - 1``, in px of the feature maps.
+    groups
+        The channels are normalised and correlated in this many groups.
+
+    Returns
+    -------
+    Tensor
+        ``(B, groups, bins, h, w)`` cosine, -1 to 1; 0 where the right image has no such pixel.
+
+    References
+    ----------
+    Guo et al., "Group-wise correlation stereo network" (2019), eq. 2.
+    """
+    batch, channels, h, w = left.shape
+    a = F.normalize(left.reshape(batch, groups, channels // groups, h, w), dim=2)
+    b = F.normalize(right.reshape(batch, groups, channels // groups, h, w), dim=2)
+    planes = []
+    for shift in range(bins):
+        if shift >= w:
+            planes.append(a.new_zeros(batch, groups, h, w))
+            continue
+        product = (a[..., shift:] * b[..., : w - shift]).sum(2)
+        planes.append(F.pad(product, (shift, 0)))
+    return torch.stack(planes, dim=2)
+
+
+def soft_argmax(logits: Tensor, values: Tensor) -> Tensor:
+    """Return the expected value over the bins, ``(B, 1, h, w)``.
+
+    Examples
+    --------
+    >>> logits = torch.zeros(1, 2, 1, 1)
+    >>> float(soft_argmax(logits, torch.tensor([0.0, 1.0])))
+    0.5
+    """
+    return (F.softmax(logits, dim=1) * values.view(1, -1, 1, 1)).sum(1, keepdim=True)
+
+
+def warp_right(right: Tensor, disparity_px: Tensor) -> Tensor:
+    """Fetch ``right`` at ``x - d`` for every left pixel.
+
+    Parameters
+    ----------
+    right
+        ``(B, C, h, w)``.
+    disparity_px
+        ``(B, 1, h, w)`` px of these maps.
+    """
+    _, _, h, w = right.shape
+    x = torch.arange(w, device=right.device, dtype=right.dtype).view(1, 1, w) - disparity_px[:, 0]
+    y = torch.arange(h, device=right.device, dtype=right.dtype).view(1, h, 1).expand_as(x)
+    grid = torch.stack((2 * x / (w - 1) - 1, 2 * y / max(h - 1, 1) - 1), dim=-1)
+    return F.grid_sample(right, grid, mode="bilinear", padding_mode="zeros", align_corners=True)
+
+
+class VolumeAggregation(nn.Module):
+    """Volume and guide features to logits over the bins, one set per hourglass.
+
+    Parameters
+    ----------
+    groups, bins
+        Of the volume ``(B, groups, bins, h, w)``.
+    guide
+        Channels of the guide features ``(B, guide, h, w)``.
+    channels, depth, stacks
+        Of the hourglasses.
+    """
+
+    def __init__(self, groups: int, bins: int, guide: int, channels: int, depth: int, stacks: int) -> None:
+        super().__init__()
+        self.local = nn.Sequential(ConvBlock3d(groups, groups), ConvBlock3d(groups, groups))
+        self.score = nn.Conv3d(groups, 1, 3, 1, 1)
+        self.enter = ConvBlock(groups * bins + guide, channels, 3)
+        self.glasses = nn.ModuleList(
+            nn.Sequential(Hourglass(channels, depth), Residual(channels, channels)) for _ in range(stacks)
+        )
+        self.heads = nn.ModuleList(nn.Conv2d(channels, bins, 1) for _ in range(stacks))
+        self.back = nn.ModuleList(nn.Conv2d(bins, channels, 1) for _ in range(stacks - 1))
+
+    def forward(self, volume: Tensor, guide: Tensor) -> tuple[list[Tensor], Tensor]:
+        """Return the logits ``(B, bins, h, w)`` from coarse to final, and the last features ``(B, channels, h, w)``."""
+        volume = volume + self.local(volume)
+        logits = [self.score(volume)[:, 0]]
+        x = self.enter(torch.cat((volume.flatten(1, 2), guide), dim=1))
+        features = x
+        for index, (glass, head) in enumerate(zip(self.glasses, self.heads, strict=True)):
+            features = glass(x)
+            logits.append(logits[-1] + head(features))
+            if index < len(self.back):
+                x = x + features + self.back[index](F.softmax(logits[-1], dim=1))
+        return logits, features

@@ -1,0 +1,103 @@
+"""Put the parts of several training runs together into one model folder with its card.
+
+Run ``python -m lfstereo.training.publish stereo=RUN edof=RUN ... -o models/bdffnet-r16-v1``.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Sequence
+from datetime import UTC, datetime
+from pathlib import Path
+
+from lfstereo.errors import ConfigError
+from lfstereo.network.bdff_net import Architecture, BdffNet
+from lfstereo.network.card import LICENCE, ModelCard, Training
+from lfstereo.network.weights import save_model
+from lfstereo.training.checkpoint import FOLDER, Counters, read_weights
+from lfstereo.training.stages import PARTS
+
+DATA = (
+    "procedural scenes of slanted and curved textured layers (lfstereo.training.scenes), rendered from seeds; "
+    "no photograph, no other data set"
+)
+DEVIATIONS = (
+    "Stereo-Net: siamese features and a group-wise correlation volume over 0 to 104 px in place of the concatenated "
+    "images, hourglasses at 1/4 of the resolution, expected bin and a refinement; the concatenation learns no matching "
+    "in the training time available",
+    "Focus-Net: a focus volume (shared weights per slice, expected slice) in place of four branches over the "
+    "concatenated slices, for the same reason",
+    "EDoF-Net, Focus-Net-Guided, BDfF-Net: convolutions as published, added to the mean slice or the incoming map",
+    "BDfF-Net's ten convolutions also see the left all-in-focus image",
+)
+LIMITS = (
+    "16 slices, evenly spaced, focus disparities within -1 to 104 px",
+    "aperture ratio D/B of 0.05 to 0.4 in training, mostly 0.08 to 0.2",
+    "trained on a processor for about an hour, on rendered scenes only: expect errors of several px on thin objects, "
+    "plain surfaces, reflections, and where the left view sees what the right one does not",
+)
+
+
+def publish(
+    sources: dict[str, Path], folder: Path, stages: Sequence[Path], device: str, force: bool = False
+) -> ModelCard:
+    """Assemble and write a model.
+
+    Parameters
+    ----------
+    sources
+        Part -> run folder; all of edof, focus, guided, stereo, fusion.
+    folder
+        Where the model goes; ``<name>-v<N>``.
+    stages
+        Run folders, in order, for the training story.
+    device
+        What the training ran on, in words.
+    force
+        Replace an existing folder.
+
+    Raises
+    ------
+    ConfigError
+        If a part has no source, or the folder's name has no version.
+    """
+    if missing := [part for part in PARTS if part not in sources]:
+        raise ConfigError(f"publish: no run is given for {missing[0]}, expected {', '.join(PARTS)}")
+    name, dash, version = folder.name.rpartition("-v")
+    if not dash or not version.isdigit():
+        raise ConfigError(f"{folder}: expected a name such as bdffnet-r16-v1, ending in a version")
+    network = BdffNet(Architecture())
+    state = network.state_dict()
+    for part, run in sources.items():
+        state.update({key: value for key, value in read_weights(run).items() if key.startswith(part + ".")})
+    network.load_state_dict(state, strict=True)
+    counters = [Counters(**json.loads((run / FOLDER / "counters.json").read_text())) for run in stages]
+    story = Training(
+        data=DATA,
+        device=device,
+        minutes=round(sum(c.elapsed_s for c in counters) / 60, 1),
+        date=datetime.now(UTC).date().isoformat(),
+        stages=tuple(f"{c.stage}: {c.step} steps, {c.elapsed_s / 60:.1f} min" for c in counters),
+    )
+    card = ModelCard(name, int(version), LICENCE, "", DEVIATIONS, LIMITS, network.architecture, story)
+    return save_model(folder, network, card, force)
+
+
+def main(words: Sequence[str] | None = None) -> int:
+    """Assemble a model from the command line."""
+    parser = argparse.ArgumentParser(prog="lfstereo.training.publish", description=__doc__)
+    parser.add_argument("parts", nargs="+", metavar="PART=RUN", help="where each part's weights come from")
+    parser.add_argument("-o", "--output", type=Path, required=True)
+    parser.add_argument("--stages", nargs="*", type=Path, default=[], help="run folders, for the training story")
+    parser.add_argument("--device", default="processor")
+    parser.add_argument("--force", action="store_true")
+    arguments = parser.parse_args(words)
+    sources = {part: Path(run) for part, _, run in (text.partition("=") for text in arguments.parts)}
+    publish(sources, arguments.output, arguments.stages, arguments.device, arguments.force)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,48 @@
+"""A training recipe: one stage, its data, its length."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from lfstereo.network.bdff_net import Architecture
+from lfstereo.options import from_mapping, option, read_toml
+
+STAGES = ("pool", "stereo", "edof", "focus", "guided", "stereo_stacks", "fusion", "joint")
+
+
+@dataclass(frozen=True, slots=True)
+class Recipe:
+    """What one training run does; a TOML file holds it, with an ``[architecture]`` table for the network."""
+
+    stage: Literal["pool", "stereo", "edof", "focus", "guided", "stereo_stacks", "fusion", "joint"] = option(
+        "stereo", "what is trained; 'pool' only renders the stacks that the other stages read"
+    )
+    seed: int = option(1, "decides scenes, order and initial weights")
+    steps: int = option(100000, "most steps; a limit in minutes may end the run earlier")
+    batch: int = option(4, "samples per step")
+    rate: float = option(1e-3, "highest learning rate of the one-cycle schedule")
+    weight_decay: float = option(1e-4, "of AdamW")
+    height: int = option(192, "of a sample", "px")
+    width: int = option(320, "of a sample", "px")
+    textures: int = option(96, "textures in the bank at any time")
+    pool: str = option("", "folder of rendered stack pairs, for the stages that learn from stacks")
+    pool_size: int = option(600, "stack pairs in the pool")
+    start_from: tuple[str, ...] = option((), "'PART=FOLDER' takes a part's weights from an earlier run's folder")
+    crop: tuple[int, int] | None = option(None, "height and width cut from each sample of the pool", "px")
+    save_every: float = option(120.0, "time between checkpoints", "s")
+    threads: int = option(2, "processor threads")
+
+
+def read_recipe(path: Path) -> tuple[Recipe, Architecture]:
+    """Read a recipe file.
+
+    Raises
+    ------
+    ConfigError
+        If the file cannot be read, an option is unknown, or a value does not fit.
+    """
+    table = read_toml(path)
+    architecture = from_mapping(Architecture, table.pop("architecture", {}), f"{path} [architecture]")
+    return from_mapping(Recipe, table, str(path)), architecture
