@@ -80,8 +80,8 @@ def frame_section(container: Container, key: str) -> Section:
             "raw picture, give the original LFR or LFP"
         )
     raise ContainerError(
-        f"{container.path}: byte {container.size}: the file ends here, expected the section {name} that the table of "
-        f"contents names as the frame's {key}; the file is cut off or damaged, copy it again from the camera"
+        f"{container.path}: byte {container.size}: the file ends here, expected the section {name[:45]!r} that the "
+        f"table of contents names as the frame's {key}; the file is cut off or damaged, copy it again from the camera"
     )
 
 
@@ -94,7 +94,7 @@ def processed_picture(container: Container) -> str:
     computed = [r for r in references(container.toc) if "cceleration" in r.path]
     if not items or not all(container.find(r.name) for r in computed):
         return ""
-    kinds = sorted({str(item.get("kind", item.get("type", "unknown"))).rpartition(".")[2] for item in items})
+    kinds = sorted({_word(str(item.get("kind", item.get("type", "unknown"))).rpartition(".")[2]) for item in items})
     known, objects = references(container.toc), _objects(container.toc)
     stack = [r for r in known if r.parent in ("perImage", "imageArray") and container.find(r.name)]
     outside = sum("imagePath" in owner and path.rpartition(".")[2].startswith("perImage") for path, owner in objects)
@@ -132,11 +132,11 @@ def section_text(container: Container, section: Section, data: bytes, known: tup
     if reference.key in _NAMES:
         return _NAMES[reference.key]
     if reference.key == "imageRef":
-        role = "thumbnail" if reference.parent.startswith("thumbnail") else reference.parent
+        role = "thumbnail" if reference.parent.startswith("thumbnail") else _word(reference.parent)
         focus = reference.owner.get("focus", reference.owner.get("lambda"))
         place = f"focused at lambda {focus:g}" if isinstance(focus, int | float) else role
         return f"{_sniffed(data)}, {place}"
-    words = "".join(f" {c.lower()}" if c.isupper() else c for c in reference.key.removesuffix("Ref"))
+    words = "".join(f" {c.lower()}" if c.isupper() else c for c in _word(reference.key.removesuffix("Ref")))
     return f"{words} ({_sniffed(data)})"
 
 
@@ -160,6 +160,11 @@ def _frame_name(container: Container, key: str) -> str | None:
     frame = entries[0].get("frame") if entries else None
     name = frame.get(key) if isinstance(frame, dict) else None
     return name if isinstance(name, str) else None
+
+
+def _word(text: str) -> str:
+    """Return a name from the file such that it cannot break a line."""
+    return "".join(c for c in text if c.isalnum())[:40]
 
 
 def _sniffed(data: bytes) -> str:

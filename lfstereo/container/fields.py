@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
@@ -10,6 +9,8 @@ from lfstereo.errors import MetadataError
 
 Json: TypeAlias = dict[str, Any]
 """A parsed JSON object."""
+LARGEST = 1e30
+"""No number in metadata is near it; keeps whole numbers of any length convertible to float."""
 _ABSENT, _DEFAULT = object(), object()
 
 
@@ -29,7 +30,7 @@ class Fields:
     def number(self, *paths: str, default: float | None = None) -> float:
         """Return a finite number."""
         value = self._find(paths, _ABSENT if default is None else default)
-        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        if isinstance(value, bool) or not isinstance(value, int | float) or not -LARGEST <= value <= LARGEST:
             raise self._unfit(paths, value, "a finite number")
         return float(value)
 

@@ -122,7 +122,7 @@ def parse_metadata(public: Json, private: Json | None, where: str) -> FrameMetad
     black, white = _levels(frame)
     return FrameMetadata(
         make=frame.text("camera.make", default=""),
-        model=_model(frame),
+        model=MODELS[frame.choice(("camera.model", "cameraModel"), tuple(MODELS))],
         firmware=frame.text("camera.firmware", default=""),
         serial=frame.private_text("camera.serialNumber"),
         width=width,
@@ -182,16 +182,6 @@ def frame_entries(toc: Json) -> list[Json]:
         if isinstance(value, list) and value and isinstance(value[0], dict):
             entries.append(value[0])
     return entries
-
-
-def _model(frame: Fields) -> str:
-    model = frame.text("camera.model", "cameraModel")
-    if model not in MODELS:
-        raise MetadataError(
-            f"{frame.where}: camera.model: found '{model}', expected one of {', '.join(MODELS)}; "
-            "no other Lytro camera is known"
-        )
-    return MODELS[model]
 
 
 def _bits(frame: Fields) -> int:

@@ -83,7 +83,7 @@ def test_reference_without_its_section_is_named(tmp_path: Path, f01_capture: Cap
     write_container(tmp_path / "a.lfp", toc, [data for name, data in parts.items() if name != key])
     size = (tmp_path / "a.lfp").stat().st_size
     with pytest.raises(
-        ContainerError, match=f"byte {size}: the file ends here, expected the section sha1-.*frame's {key}"
+        ContainerError, match=f"byte {size}: the file ends here, expected the section 'sha1-.*frame's {key}"
     ):
         read_capture(tmp_path / "a.lfp")
 
@@ -135,7 +135,7 @@ def test_raw_frame_beside_what_was_computed_from_it_is_read(tmp_path: Path, f01_
         ("f01_depth_map.lfp", r"a processed picture \(depthMap\) with a depth map 330 x 330 float32, a confidence map"),
         (
             "f01_raw_truncated.lfp",
-            "byte 4400: the file ends here, expected the section sha1-0360f825e6eed3c7c470fb79a7",
+            "byte 4400: the file ends here, expected the section 'sha1-0360f825e6eed3c7c470fb79a7",
         ),
         (
             "illum_processed.LFP",

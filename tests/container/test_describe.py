@@ -148,5 +148,5 @@ def test_real_files(real_data: Path) -> None:
     )
     assert stack.missing == ("frames[0].frame.imageRef",)
     assert all(s.intact for found in (depth, processed, stack) for s in found.sections)
-    with pytest.raises(ContainerError, match="byte 4400: the file ends here, expected the section sha1-0360"):
+    with pytest.raises(ContainerError, match="byte 4400: the file ends here, expected the section 'sha1-0360"):
         describe(folder / "f01_raw_truncated.lfp")
