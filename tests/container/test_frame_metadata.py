@@ -43,6 +43,11 @@ def test_illum_picture_round_trip(illum: FrameMetadata) -> None:
     assert parse_metadata(json.loads(text[0]), json.loads(text[1]), "x") == illum
 
 
+def test_illum_picture_round_trip_of_what_may_be_unknown(illum: FrameMetadata) -> None:
+    bare = replace(illum, awb_cct_k=None, exposure_s=None, ccm_by_cct=(), serial="")
+    assert parse_metadata(public_metadata(bare), private_metadata(bare), "x") == bare
+
+
 def test_f01_picture_round_trip(f01: FrameMetadata) -> None:
     assert parse_metadata(public_metadata(f01), private_metadata(f01), "x") == f01
 
