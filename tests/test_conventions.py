@@ -44,3 +44,10 @@ def test_examples_in_docstrings(name: str) -> None:
         return
     failed, _ = doctest.testmod(importlib.import_module(name))
     assert failed == 0
+
+
+def test_public_names_exist() -> None:
+    for name in lfstereo.__all__:
+        assert callable(getattr(lfstereo, name))
+    with pytest.raises(AttributeError, match="no attribute 'nosuch'"):
+        _ = lfstereo.nosuch
