@@ -8,6 +8,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import cv2
+import numpy as np
 import pytest
 
 EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
@@ -15,7 +17,7 @@ DATA = os.environ.get("LFSTEREO_DATA", "")
 DISPARITY_PX, RADIUS_CM = 1.0, 0.02
 
 
-def run_example(name: str, *arguments: Path) -> str:
+def run_example(name: str, *arguments: Path | str) -> str:
     environment = os.environ | {"PYTHONPATH": str(EXAMPLES.parent), "PYTHONWARNINGS": "error"}
     done = subprocess.run(
         [sys.executable, str(EXAMPLES / name), *map(str, arguments)],
@@ -51,3 +53,37 @@ def test_depth_from_disparity(tmp_path: Path) -> None:
     printed = run_example("depth_from_disparity.py", tmp_path)
     assert numbers_after("ball radius", printed)[0] == pytest.approx(8.0, abs=RADIUS_CM)
     assert {p.name for p in tmp_path.iterdir()} == {"disparity.pfm", "points.ply", "disparity_colour.png"}
+
+
+def nine_views(folder: Path) -> None:
+    """A slanted wall seen from nine places; disparity 4 to 12 px over four steps, stored times 8."""
+    rng = np.random.default_rng(0)
+    rows, columns = 80, 160
+    dots = cv2.GaussianBlur(rng.integers(0, 256, (rows, columns + 60, 3)).astype(np.uint8), (0, 0), 0.8)
+    y, x = np.mgrid[:rows, :columns].astype(np.float32)
+    per_px, at_zero = 8.0 / columns / 4, 1.0  # slope, px per step, of view 2's column
+    for n in range(9):
+        # A column c of view 2 is seen in view n at c - (n - 2) slope(c), with slope(c) = per_px c + at_zero.
+        column = (x + (n - 2) * at_zero) / (1 - (n - 2) * per_px)
+        picture = cv2.remap(dots, column + 20, y, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REFLECT)
+        cv2.imwrite(str(folder / f"im{n}.ppm"), picture)
+    cv2.imwrite(str(folder / "disp2.pgm"), np.rint(8 * 4 * (per_px * x + at_zero)).astype(np.uint8))
+
+
+def test_multiview_stereo(tmp_path: Path) -> None:
+    nine_views(tmp_path)
+    picture = tmp_path / "maps.png"
+    printed = run_example("multiview_stereo.py", tmp_path, "--near", "16", "--model", "none", "-o", picture)
+    assert numbers_after("SGBM, holes filled", printed)[0] < 0.4  # px, with an eighth of a px in the truth itself
+    assert numbers_after("SGBM + WLS", printed)[0] < 0.4
+    assert picture.is_file()
+
+
+@pytest.mark.skipif(not DATA, reason="LFSTEREO_DATA names no folder with the Middlebury nine-view scenes")
+@pytest.mark.parametrize("scene", ["Venus", "bull"])
+def test_multiview_stereo_of_photographs(scene: str) -> None:
+    folder = Path(DATA) / "stereo" / "mb2001_multiview" / scene
+    if not folder.is_dir():
+        pytest.skip(f"{folder} is not there")
+    printed = run_example("multiview_stereo.py", folder, "--model", "none")
+    assert numbers_after("SGBM + WLS", printed)[0] < 0.4  # px

@@ -58,7 +58,9 @@ def sgbm(
     matcher.setSpeckleWindowSize(100)
     matcher.setSpeckleRange(2)
     matched = _cropped(matcher.compute(coded_left, coded_right), left) / np.float32(_STEPS_PER_PX)
-    return _as_map(matched, matched >= int(np.floor(d_min)), left)
+    valid = matched >= int(np.floor(d_min))
+    valid[:, -1] = False  # OpenCV leaves the last column at the lowest disparity
+    return _as_map(matched, valid, left)
 
 
 def sgbm_wls(
@@ -170,8 +172,7 @@ def _padded(left: Rgb, right: Rgb, d_max: float, d_min: float) -> tuple[UInt8, U
 
 
 def _cropped(matched: Float32, left: Rgb) -> Float32:
-    start = matched.shape[1] - left.shape[1]
-    return matched[:, start:].astype(np.float32)
+    return matched[:, matched.shape[1] - left.shape[1] :].astype(np.float32)
 
 
 def _as_map(matched: Float32, valid: Bool, left: Rgb) -> DisparityMap:

@@ -66,6 +66,11 @@ def test_points_leave_out_what_is_unknown_far_or_at_an_outline() -> None:
     assert len(kept.points_m) == 4 + 4 + 4 - 1
 
 
+def test_no_valid_pixel_gives_no_points() -> None:
+    depth = DepthMap(np.zeros((4, 5), np.float32), np.zeros((4, 5), np.bool_))
+    assert points_from_depth(depth, GREY, 1.0, (0.0, 0.0)).points_m.shape == (0, 3)
+
+
 def test_a_slanted_plane_keeps_its_points() -> None:
     depth = plane()
     depth.depth_m[:] = 2.0 + 0.01 * np.arange(5)
