@@ -50,7 +50,7 @@ def test_mosaic_is_read_as_it_is(tmp_path: Path, small_camera: str, suffix: str,
     found = read_mosaic_image(tmp_path / f"a{suffix}", small_camera)
     assert np.array_equal(found.mosaic, pixels)
     assert found.mosaic.dtype == np.uint16
-    levels = (16.0, 255.0, 8) if dtype == np.uint8 else (168.0, 4095.0, 16)
+    levels = (10.46, 255.0, 8) if dtype == np.uint8 else (168.0, 4095.0, 16)
     assert (found.metadata.black[0], found.metadata.white[0], found.metadata.bits_per_pixel) == levels
 
 
@@ -75,7 +75,7 @@ def test_damaged_profiles(tmp_path: Path, small_camera: str) -> None:
     (tmp_path / "a.toml").write_text(text.replace("lensPitch", "pitch"))
     with pytest.raises(MetadataError, match=r"a\.toml: field 'devices\.mla\.lensPitch' is missing"):
         read_camera_profile(str(tmp_path / "a.toml"))
-    (tmp_path / "a.toml").write_text(text.replace("black = 16", ""))
+    (tmp_path / "a.toml").write_text(text.replace("black = 10.46", ""))
     with pytest.raises(MetadataError, match=r"a\.toml: levels_8_bit: field 'image\.pixelFormat\.black\.r': found None"):
         read_camera_profile(str(tmp_path / "a.toml"), bits=8)
 
