@@ -1,0 +1,215 @@
+"""Fit the lattice of micro-image centres to a white image, or to the photograph itself."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from lfstereo.arrays import Bool, Float32, Float64
+from lfstereo.container.capture import Capture
+from lfstereo.errors import GridFitError, ShapeError
+from lfstereo.lenslet.centres import Centres, measure_centres
+from lfstereo.lenslet.flatten import flatten, mean_brightness
+from lfstereo.lenslet.grid import LensletGrid
+from lfstereo.lenslet.lattice import Lattice, to_grid
+from lfstereo.lenslet.options import GridOptions
+from lfstereo.lenslet.profile import mean_micro_image
+from lfstereo.lenslet.spectrum import coarse_frequencies, lattice_from_phases
+from lfstereo.progress import Progress, silent
+
+_LEAST_SIDE_PITCHES = 12
+_FIT_RADIUS_PITCHES = 0.58
+_LEAST_EXPOSED = 0.1
+"""Where fewer micro-images than this share are well exposed, all are used."""
+_AGREEMENT_PITCHES = 0.05
+"""A lenslet agrees with the lattice when its measured centre lies this close, in pitches."""
+
+
+def fit_grid(white: Capture, options: GridOptions = GridOptions(), progress: Progress = silent) -> LensletGrid:
+    """Fit the lenslet grid to a white image.
+
+    Parameters
+    ----------
+    white
+        Raw frame of an evenly lit surface.
+    options
+        Rounds and limits.
+    progress
+        Told of each round.
+
+    Returns
+    -------
+    The grid, with the robust RMS of the measured centres (px) and the share of lenslets that agree.
+
+    Raises
+    ------
+    GridFitError
+        If the frame is no white image, shows no hexagonal pattern, or too few lenslets agree.
+    ShapeError
+        If the frame is smaller than a dozen lenslets.
+    """
+    brightness = mean_brightness(white)
+    if brightness < options.least_brightness:
+        raise GridFitError(
+            f"{white.source}: found a mean brightness of {brightness:.3f} of full scale, a white image has at least "
+            f"{options.least_brightness:g}; is it a dark frame?"
+        )
+    lattice, centres, residual, quality = _fit(white, options, progress)
+    unevenness = _unevenness(white, lattice)
+    if unevenness > options.largest_unevenness:
+        raise GridFitError(
+            f"{white.source}: brightness differs by {100 * unevenness:.0f} % between neighbouring lenslets, a white "
+            f"image stays below {100 * options.largest_unevenness:.0f} %; give the frame of an evenly lit white surface"
+        )
+    _refuse_disagreement(white.source, quality, options.least_quality, len(centres.amplitude))
+    return to_grid(lattice, _shape(white), residual, quality, "white image")
+
+
+def estimate_grid_from_photograph(
+    photograph: Capture, options: GridOptions = GridOptions(), progress: Progress = silent
+) -> LensletGrid:
+    """Fit the lenslet grid to a photograph, for want of a white image.
+
+    The dark gaps between micro-images give the lattice; the brightness of the scene drops out because every
+    Bayer site is divided by its local mean and every lenslet has a shading term of its own.
+
+    Parameters
+    ----------
+    photograph
+        Raw frame of any scene that is not dark all over.
+    options
+        Rounds; only half the share of agreeing lenslets is asked of a photograph.
+    progress
+        Told of each round.
+
+    Raises
+    ------
+    GridFitError
+        If the frame shows no hexagonal pattern, or too few lenslets agree.
+    ShapeError
+        If the frame is smaller than a dozen lenslets.
+    """
+    lattice, centres, residual, quality = _fit(photograph, options, progress)
+    _refuse_disagreement(photograph.source, quality, 0.5 * options.least_quality, len(centres.amplitude))
+    return to_grid(lattice, _shape(photograph), residual, quality, "photograph")
+
+
+def _fit(capture: Capture, options: GridOptions, progress: Progress) -> tuple[Lattice, Centres, float, float]:
+    meta = capture.metadata
+    nominal = meta.lenslets.pitch_m / meta.pixel_pitch_m if meta.pixel_pitch_m > 0 else 14.0
+    side = min(capture.mosaic.shape)
+    if capture.mosaic.ndim != 2 or side < _LEAST_SIDE_PITCHES * np.clip(nominal, 6, 20):
+        raise ShapeError(
+            f"{capture.source}: found a frame of shape {capture.mosaic.shape}, expected (height, width) of at least "
+            f"{_LEAST_SIDE_PITCHES} lenslets; give a whole raw frame"
+        )
+    steps = options.passes + 2
+    flat = flatten(capture, float(np.clip(nominal, 6, 40)))
+    progress(1, steps)
+    lattice = lattice_from_phases(flat, coarse_frequencies(flat, capture.source))
+    exposed = _well_exposed(capture, lattice.pitch)
+    progress(2, steps)
+    for n in range(options.passes):
+        stride = 1 if n == options.passes - 1 else 5
+        lattice, centres, residual, quality = _improve(flat, exposed, lattice, options.template_share, stride)
+        progress(3 + n, steps)
+    return lattice, centres, residual, quality
+
+
+def _well_exposed(capture: Capture, pitch: float) -> Bool:
+    """Return ``(H, W)``: True where a micro-image around the pixel is neither clipped nor dark."""
+    meta = capture.metadata
+    black, white = float(np.mean(meta.black)), float(np.mean(meta.white))
+    size = 2 * round(0.5 * pitch) + 1
+    clipped = cv2.dilate((capture.mosaic >= black + 0.97 * (white - black)).astype(np.uint8), np.ones((size, size)))
+    mean = cv2.blur(capture.mosaic.astype(np.float32), (size, size))
+    return np.asarray((clipped == 0) & (mean > black + 0.01 * (white - black)), np.bool_)
+
+
+def _improve(
+    flat: Float32, exposed: Bool, lattice: Lattice, share: float, stride: int
+) -> tuple[Lattice, Centres, float, float]:
+    """Measure every ``stride``-th centre and fit the lattice anew; also return RMS and agreement."""
+    radius = _FIT_RADIUS_PITCHES * lattice.pitch
+    height, width = flat.shape
+    index = lattice.indices_inside((height, width), radius + 2)[::stride]
+    expected = lattice.origin + index @ lattice.matrix.T
+    spots = np.round(expected).astype(np.int64)
+    lit = exposed[spots[:, 1], spots[:, 0]]
+    if lit.mean() > _LEAST_EXPOSED:
+        index, expected = index[lit], expected[lit]
+    centres = measure_centres(flat, expected, mean_micro_image(flat, lattice, share=share), radius)
+    measured = expected + centres.displacement
+    usable = np.hypot(*centres.displacement.T) < 0.35 * lattice.pitch
+    if usable.sum() < 30:
+        return lattice, centres, float("inf"), 0.0
+    fitted, residual = robust_affine(
+        index[usable], measured[usable], (1 / np.maximum(centres.misfit, 1e-3) ** 2)[usable]
+    )
+    distance = np.hypot(*(measured - fitted.origin - index @ fitted.matrix.T).T)
+    agree = distance < _AGREEMENT_PITCHES * lattice.pitch
+    return fitted, centres, residual, float(agree.mean())
+
+
+def robust_affine(index: Float64, points: Float64, weight: Float64) -> tuple[Lattice, float]:
+    """Fit a lattice to numbered points by reweighted least squares with Geman-McClure weights.
+
+    Parameters
+    ----------
+    index
+        ``(N, 2)`` whole lattice coordinates.
+    points
+        ``(N, 2)`` measured positions, px.
+    weight
+        ``(N,)`` confidence of each point, any scale.
+
+    Returns
+    -------
+    The lattice and the robust RMS distance of the points to it, px.
+    """
+    middle = index.mean(0)
+    design = np.column_stack([np.ones(len(index)), index - middle])
+    weight = weight / weight.mean()
+    robust = weight
+    spread = 0.0
+    for _ in range(12):
+        normal = design.T @ (design * robust[:, None])
+        solved = np.linalg.solve(normal, design.T @ (points * robust[:, None]))
+        distance = np.hypot(*(points - design @ solved).T)
+        # The median of a Rayleigh distribution is 1.1774 sigma, its RMS sqrt(2) sigma.
+        spread = max(float(np.median(distance)) / 1.1774, 1e-6)
+        robust = weight / (1 + (distance / (3 * spread)) ** 2) ** 2
+    origin = solved[0] - middle @ solved[1:]
+    return Lattice(origin=origin, row=solved[1].copy(), diagonal=solved[2].copy()), float(np.sqrt(2) * spread)
+
+
+def _unevenness(white: Capture, lattice: Lattice) -> float:
+    """Return the median relative brightness change from a lenslet to the second next one of its row."""
+    height, width = white.mosaic.shape
+    index = lattice.indices_inside((height, width), 0.6 * lattice.pitch + 3)
+    spots = np.round(lattice.origin + index @ lattice.matrix.T).astype(np.int64)
+    # The same site parity everywhere, so that colours do not count as brightness: mean over a 2 x 2 cell, twice.
+    x, y = spots[:, 0], spots[:, 1]
+    black = float(np.mean(white.metadata.black))
+    level = np.zeros(len(index))
+    for dy in range(-2, 2):
+        for dx in range(-2, 2):
+            level += white.mosaic[y + dy, x + dx] / 16
+    level -= black
+    order = np.lexsort((index[:, 0], index[:, 1]))
+    level, row = np.maximum(level[order], 1.0), index[order, 1]
+    same = row[2:] == row[:-2]
+    change = np.abs(level[2:] - level[:-2]) / np.maximum(level[2:], level[:-2])
+    return float(np.median(change[same]))
+
+
+def _refuse_disagreement(where: str, quality: float, least: float, count: int) -> None:
+    if not quality >= least:
+        raise GridFitError(
+            f"{where}: only {100 * quality:.0f} % of {count} lenslets agree with one regular grid, expected at least "
+            f"{100 * least:.0f} %; the frame is damaged, dark or not from a lenslet camera"
+        )
+
+
+def _shape(capture: Capture) -> tuple[int, int]:
+    return int(capture.mosaic.shape[0]), int(capture.mosaic.shape[1])
