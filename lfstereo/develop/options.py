@@ -1,0 +1,23 @@
+"""Options of the development of a raw mosaic."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from lfstereo.options import option
+
+DemosaicMethod = Literal["malvar2004", "bilinear"]
+
+
+@dataclass(frozen=True, slots=True)
+class DevelopOptions:
+    """How a raw mosaic becomes linear RGB."""
+
+    demosaic: DemosaicMethod = option("malvar2004", "how missing colours are interpolated")
+    white_balance: Literal["camera", "grey-world"] = option("camera", "gains that the camera wrote, or a grey mean")
+    shading_floor: float = option(0.05, "least relative illumination that devignetting divides by")
+    hot_pixels: bool = option(True, "repair pixels that their neighbours of the same colour contradict")
+    hot_pixel_excess: float = option(0.5, "relative distance from the neighbours' range that makes a pixel hot")
+    exposure_bias: bool = option(True, "apply the camera's exposure bias")
+    colour_matrix: bool = option(True, "turn camera colours into linear sRGB")
