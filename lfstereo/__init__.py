@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from lfstereo.errors import LfstereoError
     from lfstereo.focus.refocus import refocus, render_stack
     from lfstereo.lenslet.white import find_white_image
-    from lfstereo.lightfield.decode import decode
+    from lfstereo.lightfield.decoding import decode
     from lfstereo.lightfield.store import read_light_field, write_light_field
     from lfstereo.network.estimate import estimate_disparity, load_network
     from lfstereo.pipeline import run_pair
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 _PUBLIC = {
     "LfstereoError": "errors",
-    "decode": "lightfield.decode",
+    "decode": "lightfield.decoding",
     "estimate_disparity": "network.estimate",
     "find_white_image": "lenslet.white",
     "load_network": "network.estimate",

@@ -16,7 +16,7 @@ from lfstereo.errors import AssetError, ConfigError, ShapeError
 from lfstereo.focus.refocus import render_stack, slice_disparities
 from lfstereo.focus.stack import FocalStack
 from lfstereo.lenslet.white import find_white_image
-from lfstereo.lightfield.decode import decode
+from lfstereo.lightfield.decoding import decode
 from lfstereo.lightfield.field import LightField
 from lfstereo.lightfield.store import read_light_field
 from lfstereo.options import option

@@ -1,0 +1,159 @@
+"""Raw capture to light field: grid, develop, resample."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from lfstereo.arrays import Float32
+from lfstereo.container.capture import Capture
+from lfstereo.develop.develop import develop
+from lfstereo.develop.shading import shading_from_photograph, shading_from_white_image
+from lfstereo.errors import AssetError, ConfigError
+from lfstereo.lenslet.fit import estimate_grid_from_photograph, fit_grid
+from lfstereo.lenslet.grid import LensletGrid
+from lfstereo.lenslet.options import GridOptions
+from lfstereo.lightfield.field import LightField
+from lfstereo.lightfield.options import DecodeOptions, ViewOptions
+from lfstereo.lightfield.resample import sample_views, sample_weights, view_sampling, views_inside
+from lfstereo.progress import Progress, silent
+
+_RIM_PX = 0.8
+"""Width of a micro-image's dark rim that no view is taken from."""
+
+
+def decode(
+    capture: Capture,
+    white: Capture | None,
+    options: DecodeOptions = DecodeOptions(),
+    progress: Progress = silent,
+) -> LightField:
+    """Decode a raw capture to its views.
+
+    Parameters
+    ----------
+    capture
+        The photograph.
+    white
+        White image of the same camera at a like zoom and focus; ``None`` takes the lenslet grid and the
+        illumination of the micro-images from the photograph.
+    options
+        Number and distance of the views, and the options of each step.
+    progress
+        Told of the work done, in hundredths.
+
+    Returns
+    -------
+    The light field: ``(15, 15, 434, 625, 3)`` for an Illum, about ``(9, 9, 381, 382, 3)`` for a first-generation
+    camera. Values are linear RGB, not below 0 and not clipped above 1; views beyond the micro-images' radius are
+    black with weight 0.
+
+    Raises
+    ------
+    AssetError
+        If the white image is of another camera or size.
+    GridFitError
+        If the white image is none, or no grid can be fitted.
+    ConfigError
+        If the number of views or their distance cannot be.
+    MetadataError
+        If the colour matrix cannot be used.
+    """
+    grid, shading = calibrate(capture, white, options.grid, _part(progress, 0, 25))
+    return views_from(capture, grid, shading, options, _part(progress, 25, 100))
+
+
+def views_from(
+    capture: Capture,
+    grid: LensletGrid,
+    shading: Float32,
+    options: DecodeOptions = DecodeOptions(),
+    progress: Progress = silent,
+) -> LightField:
+    """Develop a capture and read its views, with a known grid and illumination; as in :func:`decode`.
+
+    Parameters
+    ----------
+    capture
+        The photograph.
+    grid
+        Its lenslet grid.
+    shading
+        ``(H, W)`` float32 relative illumination of its pixels, 1 = full light.
+    options
+        Number and distance of the views, and how the mosaic is developed.
+    progress
+        Told of the work done, in hundredths.
+    """
+    count = view_count(grid, options.view)
+    sampling = view_sampling(grid, options.view.view_step_px)
+    image = develop(capture, shading, options.develop)
+    progress(30, 100)
+    views = sample_views(image, grid, sampling, count, _part(progress, 30, 90))
+    del image
+    np.maximum(views, 0, out=views)
+    views[~views_inside(grid, sampling, count)] = 0
+    weight = sample_weights(shading, grid, sampling, count)
+    progress(100, 100)
+    return LightField(
+        views=views, weight=weight, sampling=sampling, serial=capture.metadata.serial, source=capture.source
+    )
+
+
+def calibrate(
+    capture: Capture, white: Capture | None, options: GridOptions = GridOptions(), progress: Progress = silent
+) -> tuple[LensletGrid, Float32]:
+    """Find the lenslet grid and the illumination of each pixel, from a white image or the photograph itself.
+
+    Raises
+    ------
+    AssetError
+        If the white image is of another camera or size.
+    GridFitError
+        If the white image is none, or no grid can be fitted.
+    """
+    if white is None:
+        grid = estimate_grid_from_photograph(capture, options, progress)
+        return grid, shading_from_photograph(capture, grid)
+    _refuse_other_camera(capture, white)
+    return fit_grid(white, options, progress), shading_from_white_image(white)
+
+
+def view_count(grid: LensletGrid, options: ViewOptions) -> int:
+    """Return the number of views per direction: 15 for an Illum, 9 for a first-generation camera.
+
+    Raises
+    ------
+    ConfigError
+        If the options ask for an even or negative number of views, or for a distance that is not positive.
+    """
+    step = options.view_step_px
+    if not 0.1 <= step <= 10:
+        raise ConfigError(f"view_step_px: found {step:g}, expected 0.1 to 10 sensor px; leave it out for 0.884")
+    if options.views:
+        if options.views < 1 or options.views % 2 == 0:
+            raise ConfigError(f"views: found {options.views}, expected an odd number so that there is a centre view")
+        return options.views
+    pitch = float(np.hypot(*grid.step_u_px))
+    return 2 * int((0.5 * pitch - _RIM_PX) / step) + 1
+
+
+def _refuse_other_camera(capture: Capture, white: Capture) -> None:
+    found, wanted = white.mosaic.shape, capture.mosaic.shape
+    if found != wanted:
+        raise AssetError(
+            f"{white.source}: found a white image of {found[1]} x {found[0]} px, expected {wanted[1]} x {wanted[0]} "
+            f"as {capture.source}; give the white image of the same camera"
+        )
+    ours, theirs = capture.metadata.serial, white.metadata.serial
+    if ours and theirs and ours != theirs:
+        raise AssetError(
+            f"{white.source}: found a white image of serial {theirs}, expected {ours} as {capture.source}; give the "
+            "white image of the same camera"
+        )
+
+
+def _part(progress: Progress, start: int, stop: int) -> Progress:
+    def report(done: int, total: int) -> None:
+        progress(start + (stop - start) * done // max(total, 1), 100)
+
+    return report

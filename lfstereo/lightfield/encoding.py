@@ -1,0 +1,63 @@
+"""Linear light to 16-bit codes and to sRGB pictures, and back."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from lfstereo.arrays import Float32, UInt8, UInt16
+
+CODE_MAX = 65535
+
+
+def to_codes(values: Float32, peak: float) -> UInt16:
+    """Store linear light as the square root of its share of ``peak``: finer where it is darker.
+
+    Examples
+    --------
+    >>> to_codes(np.array([0.0, 0.25, 1.0, 4.0], np.float32), 4.0).tolist()
+    [0, 16384, 32768, 65535]
+    """
+    share = np.maximum(values, 0) * np.float32(1 / peak)
+    return (np.sqrt(np.minimum(share, 1)) * np.float32(CODE_MAX) + np.float32(0.5)).astype(np.uint16)
+
+
+def from_codes(codes: UInt16, peak: float) -> Float32:
+    """Return the linear light that codes stand for."""
+    root = codes.astype(np.float32)
+    root *= np.float32(np.sqrt(peak) / CODE_MAX)
+    return np.multiply(root, root, out=root)
+
+
+def linear_to_srgb(linear: Float32) -> UInt8:
+    """Encode linear light for a screen: 8-bit sRGB, clipped to 0..1.
+
+    References
+    ----------
+    IEC 61966-2-1:1999, transfer function.
+
+    Examples
+    --------
+    >>> linear_to_srgb(np.array([0.0, 0.2140, 1.0], np.float32)).tolist()
+    [0, 127, 255]
+    """
+    clipped = np.clip(linear, 0, 1)
+    coded = np.where(clipped <= 0.0031308, 12.92 * clipped, 1.055 * np.power(clipped, 1 / 2.4) - 0.055)
+    return np.asarray(255 * coded + 0.5, np.uint8)
+
+
+def srgb_to_linear(coded: UInt8 | UInt16) -> Float32:
+    """Decode 8-bit or 16-bit sRGB to linear light, 1.0 = white.
+
+    References
+    ----------
+    IEC 61966-2-1:1999, transfer function.
+
+    Examples
+    --------
+    >>> srgb_to_linear(np.array([0, 188, 255], np.uint8)).round(3).tolist()
+    [0.0, 0.503, 1.0]
+    """
+    levels = np.iinfo(coded.dtype).max
+    ramp = np.arange(levels + 1) / levels
+    table = np.where(ramp <= 0.04045, ramp / 12.92, ((ramp + 0.055) / 1.055) ** 2.4).astype(np.float32)
+    return np.asarray(table[coded], np.float32)

@@ -1,0 +1,84 @@
+"""Pictures of a light field for looking at: views side by side and epipolar-plane images."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from lfstereo.arrays import Float32, Rgb, UInt8
+from lfstereo.lightfield.encoding import linear_to_srgb
+from lfstereo.lightfield.field import LightField
+
+_GAP = 4
+_EPI_ZOOM = 4
+
+
+def horizontal_epi(light_field: LightField, row: int) -> Rgb:
+    """Return the epipolar-plane image of one image row through the centre row of views.
+
+    Returns
+    -------
+    ``(S, U, 3)``: a point of slope sigma draws a line that moves by ``-sigma`` px per row downwards.
+    """
+    return np.ascontiguousarray(light_field.views[light_field.centre[0], :, row])
+
+
+def vertical_epi(light_field: LightField, column: int) -> Rgb:
+    """Return the epipolar-plane image of one image column through the centre column of views, ``(T, V, 3)``."""
+    return np.ascontiguousarray(light_field.views[:, light_field.centre[1], :, column])
+
+
+def display_gain(light_field: LightField) -> float:
+    """Return the factor that brings the brighter parts of the centre view near white."""
+    bright = float(np.percentile(light_field.views[light_field.centre][::2, ::2], 99))
+    return 1.0 / max(bright, 1e-3)
+
+
+def montage(light_field: LightField, raw_crop: UInt8 | None = None) -> UInt8:
+    """Draw the centre view, nine views at half size and three EPIs into one picture.
+
+    Parameters
+    ----------
+    light_field
+        What to draw; brightness is stretched so that 99 % of the centre view fits.
+    raw_crop
+        ``(h, w, 3)`` picture of the raw frame with the grid drawn over it, added below if given.
+
+    Returns
+    -------
+    ``(H, W, 3)`` uint8 sRGB.
+    """
+    gain = np.float32(display_gain(light_field))
+    rows, columns = light_field.views.shape[:2]
+    height, width = light_field.views.shape[2:4]
+    centre = linear_to_srgb(light_field.views[light_field.centre] * gain)
+    t_picks, s_picks = ([round(n * f) for f in (0.25, 0.5, 0.75)] for n in (rows - 1, columns - 1))
+    small = (max(width // 3, 1), max(height // 3, 1))
+    nine = _stack(
+        [_stack([_shrunk(light_field.views[t, s] * gain, small) for s in s_picks], axis=1) for t in t_picks], axis=0
+    )
+    epis = _stack([_epi(light_field, round(height * f), gain) for f in (0.3, 0.5, 0.7)], axis=0)
+    parts = [_stack([centre, nine], axis=1), epis]
+    if raw_crop is not None:
+        parts.append(raw_crop)
+    return _stack(parts, axis=0)
+
+
+def _epi(light_field: LightField, row: int, gain: np.float32) -> UInt8:
+    return np.repeat(linear_to_srgb(horizontal_epi(light_field, row) * gain), _EPI_ZOOM, axis=0)
+
+
+def _shrunk(view: Float32, size: tuple[int, int]) -> UInt8:
+    return linear_to_srgb(np.asarray(cv2.resize(view, size, interpolation=cv2.INTER_AREA), np.float32))
+
+
+def _stack(pictures: list[UInt8], axis: int) -> UInt8:
+    """Put pictures in a row (axis 1) or column (axis 0), padded to one size, with a gap between."""
+    across = max(picture.shape[1 - axis] for picture in pictures)
+    padded = []
+    for n, picture in enumerate(pictures):
+        room = [(0, 0), (0, 0), (0, 0)]
+        room[1 - axis] = (0, across - picture.shape[1 - axis])
+        room[axis] = (0, _GAP if n < len(pictures) - 1 else 0)
+        padded.append(np.pad(picture, room))
+    return np.concatenate(padded, axis=axis)
