@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 
 EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
-DATA = os.environ.get("LFSTEREO_DATA", "")
 DISPARITY_PX, RADIUS_CM = 1.0, 0.02
 
 
@@ -79,11 +78,8 @@ def test_multiview_stereo(tmp_path: Path) -> None:
     assert picture.is_file()
 
 
-@pytest.mark.skipif(not DATA, reason="LFSTEREO_DATA names no folder with the Middlebury nine-view scenes")
 @pytest.mark.parametrize("scene", ["Venus", "bull"])
-def test_multiview_stereo_of_photographs(scene: str) -> None:
-    folder = Path(DATA) / "stereo" / "mb2001_multiview" / scene
-    if not folder.is_dir():
-        pytest.skip(f"{folder} is not there")
+def test_multiview_stereo_of_photographs(real_data: Path, scene: str) -> None:
+    folder = real_data / "stereo" / "mb2001_multiview" / scene
     printed = run_example("multiview_stereo.py", folder, "--model", "none")
     assert numbers_after("SGBM + WLS", printed)[0] < 0.4  # px

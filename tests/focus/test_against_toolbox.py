@@ -2,29 +2,24 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import numpy as np
-import pytest
 
 from lfstereo.focus.aperture import RefocusOptions
 from lfstereo.focus.refocus import refocus
 from lfstereo.lightfield.field import LightField
 
-FOLDER = Path(os.environ.get("LFSTEREO_DATA", "")) / "lftoolbox_reference" / "crop600"
 TOLERANCE = 2e-4  # linear RGB; weights are rounded to 8 bits here
 BORDER_PX = 8  # the toolbox repeats the edge, here what lies outside a view has no weight
 
 
-@pytest.mark.skipif("LFSTEREO_DATA" not in os.environ, reason="LFSTEREO_DATA names no folder with the reference")
-def test_equals_shift_sum_of_the_light_field_toolbox() -> None:
-    if not (FOLDER / "filters.npz").is_file():
-        pytest.skip(f"{FOLDER} is not there")
-    decoded = np.load(FOLDER / "decoded.npz")["LF"].astype(np.float32) / 65535
+def test_equals_shift_sum_of_the_light_field_toolbox(real_data: Path) -> None:
+    folder = real_data / "lftoolbox_reference" / "crop600"
+    decoded = np.load(folder / "decoded.npz")["LF"].astype(np.float32) / 65535
     weight = np.rint(decoded[..., 3] * 255).astype(np.uint8)
     field = LightField(np.ascontiguousarray(decoded[..., :3]), weight, None, "", "toolbox")
-    reference = np.load(FOLDER / "filters.npz")
+    reference = np.load(folder / "filters.npz")
     # Its views lie at slope * N * linspace(-1/2, 1/2, N), and its slope grows with distance.
     slopes = -reference["slopes"].ravel() * 15 / 14
     found = refocus(field, slopes, RefocusOptions(aperture="all"))
