@@ -19,12 +19,20 @@ ROWS_PER_BAND = 16
 """Image rows that one thread sums at a time; their slices stay in its cache."""
 
 
-def _compiled(parallel: bool = False) -> Callable[[_FunctionT], _FunctionT]:
-    decorate = numba.njit(cache=True, parallel=parallel, nogil=True, fastmath={"contract"})
-    return cast(Callable[[_FunctionT], _FunctionT], decorate)
+def compiled(parallel: bool = False) -> Callable[[_FunctionT], _FunctionT]:
+    """Compile a function, kept on disk for the next run where any folder for that can be written."""
+
+    def decorate(function: _FunctionT) -> _FunctionT:
+        settings = {"parallel": parallel, "nogil": True, "fastmath": {"contract"}}
+        try:
+            return cast(_FunctionT, numba.njit(cache=True, **settings)(function))
+        except RuntimeError:
+            return cast(_FunctionT, numba.njit(**settings)(function))
+
+    return decorate
 
 
-@_compiled()
+@compiled()
 def add_shifted_row(total: Float32, row: Float32, shift_px: float, gain: float, channels: int) -> None:
     """Add ``gain * row(x - shift_px)`` to ``total``, linearly interpolated, zero outside the row."""
     whole = int(np.floor(shift_px))
@@ -45,7 +53,7 @@ def add_shifted_row(total: Float32, row: Float32, shift_px: float, gain: float, 
         total[x] += far_gain * row[x - offset - channels]
 
 
-@_compiled()
+@compiled()
 def add_between_rows(image: Float32, row: Float32, y: float, first: int, last: int) -> None:
     """Add one row at the height ``y`` to the two rows of ``image`` around it that lie in ``[first, last)``."""
     above = int(np.floor(y))
@@ -61,17 +69,17 @@ def add_between_rows(image: Float32, row: Float32, y: float, first: int, last: i
             target[x] += part * row[x]
 
 
-@_compiled()
+@compiled()
 def _reaches(y: float, first: int, last: int) -> bool:
     return first - 1 < y < last
 
 
-@_compiled()
+@compiled()
 def _reach_px(slopes: Float64, views_away: int) -> int:
     return int(np.ceil(np.max(np.abs(slopes)) * abs(views_away))) + 1
 
 
-@_compiled(parallel=True)
+@compiled(parallel=True)
 def sum_views(
     views: Float32, aperture: Float32, slopes: Float64, centre: tuple[int, int], first_row: int, slices: Float32
 ) -> None:
@@ -96,7 +104,7 @@ def sum_views(
                     add_between_rows(slices[k], total, y - first_row, first - first_row, last - first_row)
 
 
-@_compiled()
+@compiled()
 def weigh_rows(views: Float32, weight: UInt8, t: int, v: int, colours: Float32, confidences: Float32) -> None:
     """Fill ``colours (S, U*3)`` and ``confidences (S, U)`` with row ``v`` of view row ``t``, weight 255 as 1."""
     for s in range(views.shape[1]):
@@ -107,7 +115,7 @@ def weigh_rows(views: Float32, weight: UInt8, t: int, v: int, colours: Float32, 
                 colours[s, 3 * u + c] = share * views[t, s, v, 3 * u + c] if share > 0 else np.float32(0.0)
 
 
-@_compiled(parallel=True)
+@compiled(parallel=True)
 def sum_weighted_views(
     views: Float32,
     weight: UInt8,

@@ -9,6 +9,7 @@ from scipy.ndimage import shift
 from lfstereo.errors import ConfigError, InputError, ShapeError
 from lfstereo.focus.aperture import RefocusOptions, aperture_weights, blur_ratio
 from lfstereo.focus.refocus import refocus, render_stack, slice_disparities
+from lfstereo.focus.shift_kernels import compiled
 from lfstereo.lightfield.field import LightField
 
 ALL_VIEWS = RefocusOptions(aperture="all")
@@ -115,6 +116,13 @@ def test_a_pixel_that_no_weight_reaches_shows_the_centre_view() -> None:
 def test_one_view_is_its_own_picture() -> None:
     views = np.random.default_rng(4).random((1, 1, 6, 7, 3))
     np.testing.assert_allclose(refocus(field_of(views), [5.0, -3.0]), np.repeat(views[0], 2, axis=0), atol=TOLERANCE)
+
+
+def test_kernels_compile_where_no_cache_can_be_kept() -> None:
+    """A function without a source file has nowhere to be cached, like an installation that nobody may write."""
+    names: dict[str, object] = {}
+    exec("def twice(x):\n    return 2 * x", names)
+    assert compiled()(names["twice"])(21) == 42  # type: ignore[operator,type-var]
 
 
 def test_disc_leaves_out_the_corner_views() -> None:
