@@ -62,7 +62,9 @@ def seen_at(camera: PlenopticCamera, sampling: ViewSampling, point: np.ndarray, 
     return np.array([[c, s], [-s, c]]) @ (sensor - sampling.origin_px) / sampling.step_px
 
 
-def rectified_px(geometry: RectifiedGeometry, rig: StereoRig, side: Side, t: int, s: int, point: np.ndarray) -> np.ndarray:
+def rectified_px(
+    geometry: RectifiedGeometry, rig: StereoRig, side: Side, t: int, s: int, point: np.ndarray
+) -> np.ndarray:
     camera = rig.left if side == "left" else rig.right
     light_field = decoded(camera)
     assert light_field.sampling is not None
