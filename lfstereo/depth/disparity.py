@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from lfstereo.arrays import Bool, Disparity, Rgb
+from lfstereo.arrays import Bool, Disparity, Rgb, check_shape
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,3 +17,8 @@ class DisparityMap:
     """``(V, U)``: false where the pair gives no support (outside the common field of view)."""
     all_in_focus: Rgb
     """``(V, U, 3)`` linear RGB of the left view, everything sharp."""
+
+    def __post_init__(self) -> None:
+        check_shape("disparity", self.disparity, (None, None))
+        check_shape("valid pixels of the disparity", self.valid, self.disparity.shape)
+        check_shape("all-in-focus picture of the disparity", self.all_in_focus, (*self.disparity.shape, 3))

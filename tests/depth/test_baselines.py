@@ -85,6 +85,12 @@ def test_refuses_views_of_two_sizes() -> None:
         sgbm(np.zeros((20, 60, 3), np.float32), np.zeros((20, 61, 3), np.float32), 8.0)
 
 
+@pytest.mark.parametrize("shapes", [((4,), (4,), (4, 3)), ((4, 5), (4, 4), (4, 5, 3)), ((4, 5), (4, 5), (4, 5))])
+def test_a_disparity_map_keeps_one_size(shapes: tuple[tuple[int, ...], ...]) -> None:
+    with pytest.raises(ShapeError, match="disparity: found an array of shape"):
+        DisparityMap(np.zeros(shapes[0], np.float32), np.zeros(shapes[1], np.bool_), np.zeros(shapes[2], np.float32))
+
+
 def test_scores_of_known_errors() -> None:
     truth = np.full((1, 10), 20.0, np.float32)
     found = truth + np.float32([[0, 0.4, 0.6, -0.9, 1.1, -1.9, 2.1, 3.9, -4.1, 50.0]])

@@ -10,6 +10,7 @@ from lfstereo.errors import ConfigError, InputError, ShapeError
 from lfstereo.focus.aperture import RefocusOptions, aperture_weights, blur_ratio
 from lfstereo.focus.refocus import refocus, render_stack, slice_disparities
 from lfstereo.focus.shift_kernels import compiled
+from lfstereo.focus.stack import FocalStack
 from lfstereo.lightfield.field import LightField
 
 ALL_VIEWS = RefocusOptions(aperture="all")
@@ -190,3 +191,9 @@ def test_refuses_disparities_that_rise() -> None:
         slice_disparities(0.0, 10.0)
     with pytest.raises(ShapeError, match="must fall"):
         render_stack(field_of(np.zeros((1, 1, 4, 4, 3))), np.array([0.0, 1.0]), (0.1, 0.0))
+
+
+@pytest.mark.parametrize("slices, disparities", [((2, 4, 4), (2,)), ((2, 4, 4, 3), (3,))])
+def test_a_stack_has_one_disparity_per_slice(slices: tuple[int, ...], disparities: tuple[int, ...]) -> None:
+    with pytest.raises(ShapeError, match=r"test: (slices|disparities): found an array of shape"):
+        FocalStack(np.zeros(slices, np.float32), -np.arange(disparities[0], dtype=np.float32), 0.1, "test")
