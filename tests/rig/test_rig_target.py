@@ -39,7 +39,8 @@ def test_the_printed_checkerboard_has_its_corners_where_the_points_are() -> None
     # First corner one square and the 8 mm margin from the page's corner; pixel centres lie half a pixel later.
     # OpenCV may count from the other end.
     expected = (CHECKERBOARD.points[:, :2] * 1e3 + 18) * 10 - 0.5
-    ordered = corners[:, 0] if corners[0, 0, 0] < corners[-1, 0, 0] else corners[::-1, 0]
+    corners = corners.reshape(-1, 2)
+    ordered = corners if corners[0, 0] < corners[-1, 0] else corners[::-1]
     np.testing.assert_allclose(ordered, expected, atol=0.2)
 
 
