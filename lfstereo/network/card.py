@@ -49,7 +49,7 @@ class ModelCard:
     name: str
     version: int
     licence: str
-    weights_sha256: str
+    sha256: str
     deviations: tuple[str, ...]
     """Where the networks differ from the published description, and why."""
     limits: tuple[str, ...]

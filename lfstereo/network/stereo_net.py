@@ -7,7 +7,9 @@ more training than an hour of a processor gives.
 ``fusion = "correlation"`` deviates on purpose: the stem runs on each image by itself (siamese) down to a quarter of the
 resolution, a group-wise correlation over 0 to 104 px replaces the concatenation, and the same two hourglasses (depth 4,
 which reaches the same 1/64 of the resolution) work on that volume together with the left features. The disparity
-is the expected bin; a small refinement at half resolution brings back the edges of the left image.
+is the expected bin; a small refinement at half resolution brings back the edges of the left image. Half of the volume
+is not learned at all: normalised cross-correlation of the images themselves, which knows what matching means before the
+first step and carries over to pictures unlike the training scenes.
 
 References
 ----------
@@ -28,13 +30,25 @@ import torch.nn.functional as F
 from torch import Tensor, nn
 
 from lfstereo.network.blocks import ConvBlock, DeconvBlock, Hourglass, Residual, initialise
-from lfstereo.network.volume import VolumeAggregation, group_correlation, soft_argmax, warp_right
+from lfstereo.network.volume import (
+    VolumeAggregation,
+    group_correlation,
+    likeness,
+    likeness_volume,
+    soft_argmax,
+    warp_right,
+)
 
 BIN_PX = 4
 BINS = 27
 SEARCH_PX = float(BIN_PX * (BINS - 1))
 """Largest disparity (px) that the correlation variant can find."""
-GROUPS = 8
+GROUPS = 4
+"""Learned groups of the volume; as many again are cross-correlations: two windows at two shifts per bin."""
+DILATIONS = (1, 3)
+"""Of the 5 x 5 windows of the cross-correlation at half resolution: 10 and 26 px of the picture."""
+LOOK_AROUND_PX = (-3.0, -1.5, 0.0, 1.5, 3.0)
+"""Where, around the coarse disparity, the refinement compares the images."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +82,7 @@ class StereoNet(nn.Module):
         self.body: nn.Module = _Concatenated(channels) if fusion == "concat" else _Correlated(channels)
         initialise(self)
         if isinstance(self.body, _Correlated):
-            self.body.refine.start_small()
+            self.body.start_from_likeness()
 
     def forward(self, left: Tensor, right: Tensor) -> Prediction:
         """Return the predictions of every stage."""
@@ -124,7 +138,7 @@ class _Refinement(nn.Module):
     def __init__(self, half: int, channels: int) -> None:
         super().__init__()
         self.context = nn.Conv2d(channels, half, 1)
-        self.enter = ConvBlock(3 * half + 1, half)
+        self.enter = ConvBlock(3 * half + 1 + len(LOOK_AROUND_PX), half)
         self.body = nn.Sequential(Residual(half, half), ConvBlock(half, half), Residual(half, half))
         self.residual = nn.Conv2d(half, 1, 3, 1, 1)
         self.mask = nn.Conv2d(half, 4 * 9, 1)
@@ -134,12 +148,22 @@ class _Refinement(nn.Module):
         for part in (self.residual, self.mask):
             nn.init.normal_(part.weight, std=1e-3)
 
-    def forward(self, disparity: Tensor, context: Tensor, left: Tensor, right: Tensor) -> Tensor:
+    def forward(self, disparity: Tensor, context: Tensor, left: Tensor, right: Tensor, images: Tensor) -> Tensor:
         coarse = F.interpolate(disparity, scale_factor=2, mode="bilinear", align_corners=False)
         context = F.interpolate(self.context(context), scale_factor=2, mode="bilinear", align_corners=False)
         warped = warp_right(right, coarse * 50.0)
-        x = self.body(self.enter(torch.cat((left, left - warped, context, coarse), dim=1)))
+        x = self.body(
+            self.enter(torch.cat((left, left - warped, context, coarse, _look_around(images, coarse)), dim=1))
+        )
         return convex_upsample(coarse + 0.1 * self.residual(x), self.mask(x))
+
+
+@torch.no_grad()
+def _look_around(images: Tensor, coarse: Tensor) -> Tensor:
+    """Likeness of the half-resolution images ``(2 B, 3, h, w)`` at disparities around the coarse one."""
+    left, right = images.chunk(2)
+    near = [likeness(left, warp_right(right, coarse * 50.0 + 0.5 * px), 5) for px in LOOK_AROUND_PX]
+    return torch.cat(near, dim=1)
 
 
 def convex_upsample(small: Tensor, mask: Tensor) -> Tensor:
@@ -164,17 +188,29 @@ class _Correlated(nn.Module):
     def __init__(self, channels: int) -> None:
         super().__init__()
         self.features = _Features(channels)
-        self.aggregate = VolumeAggregation(GROUPS, BINS, channels, channels, depth=4, stacks=2)
+        groups = GROUPS + 2 * len(DILATIONS)
+        self.aggregate = VolumeAggregation(groups, BINS, channels, channels, depth=4, stacks=2)
         self.refine = _Refinement(channels // 2, channels)
         values = torch.arange(BINS, dtype=torch.float32) * (BIN_PX / 100.0)
         self.register_buffer("bin_values", values, persistent=False)
 
+    def start_from_likeness(self) -> None:
+        """Begin as block matching with plain upsampling."""
+        self.refine.start_small()
+        score = self.aggregate.score.weight
+        nn.init.normal_(score, std=0.02)
+        with torch.no_grad():
+            score[0, GROUPS:, 1, 1, 1] = 3.0
+
     def forward(self, left: Tensor, right: Tensor) -> Prediction:
         batch = left.shape[0]
-        half, quarter = self.features(torch.cat((left, right)))
-        volume = group_correlation(quarter[:batch], quarter[batch:], BINS, GROUPS)
+        images = torch.cat((left, right))
+        half, quarter = self.features(images)
+        images = F.avg_pool2d(images, 2)
+        learned = group_correlation(quarter[:batch], quarter[batch:], BINS, GROUPS)
+        volume = torch.cat((learned, likeness_volume(images[:batch], images[batch:], BINS, DILATIONS)), dim=1)
         logits, context = self.aggregate(volume, quarter[:batch])
         coarse = [soft_argmax(scores, self.bin_values) for scores in logits]
-        final = self.refine(coarse[-1], context, half[:batch], half[batch:])
+        final = self.refine(coarse[-1], context, half[:batch], half[batch:], images)
         full = [F.interpolate(m, scale_factor=4, mode="bilinear", align_corners=False) for m in coarse]
         return Prediction((*full, final), tuple(logits))

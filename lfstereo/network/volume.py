@@ -48,6 +48,94 @@ def group_correlation(left: Tensor, right: Tensor, bins: int, groups: int) -> Te
     return torch.stack(planes, dim=2)
 
 
+def likeness(left: Tensor, right: Tensor, window: int) -> Tensor:
+    """Zero-mean normalised cross-correlation of two aligned images in square windows.
+
+    Parameters
+    ----------
+    left, right
+        ``(B, 3, h, w)`` display-referred.
+    window
+        Side of the window in px, odd.
+
+    Returns
+    -------
+    Tensor
+        ``(B, 1, h, w)``, -1 to 1; near 0 where either window is plain (:data:`PLAIN_VARIANCE`).
+
+    References
+    ----------
+    Lewis, "Fast normalized cross-correlation" (1995), eq. 2, with a floor under the variances.
+    """
+    colours = left.shape[1]
+    moments = _box(torch.cat((left, right, left * left, right * right, left * right), dim=1), window)
+    mean_l, mean_r, square_l, square_r, product = moments.split(colours, dim=1)
+    variance_l = (square_l - mean_l * mean_l).sum(1, keepdim=True).clamp(min=0) + PLAIN_VARIANCE
+    variance_r = (square_r - mean_r * mean_r).sum(1, keepdim=True).clamp(min=0) + PLAIN_VARIANCE
+    return (product - mean_l * mean_r).sum(1, keepdim=True) / torch.sqrt(variance_l * variance_r)
+
+
+def _box(image: Tensor, window: int) -> Tensor:
+    """Mean over square windows, the border repeated."""
+    channels, half = image.shape[1], window // 2
+    ones = image.new_full((channels, 1, window, 1), 1 / window)
+    padded = F.pad(image, (half, half, half, half), mode="replicate")
+    return F.conv2d(F.conv2d(padded, ones, groups=channels), ones.transpose(2, 3), groups=channels)
+
+
+def window_vectors(image: Tensor, dilation: int) -> Tensor:
+    """Describe every pixel by its 5 x 5 window (every ``dilation``-th px), mean removed, length at most 1.
+
+    The dot product of two such vectors is the windows' zero-mean normalised cross-correlation, :func:`likeness`.
+
+    Returns
+    -------
+    Tensor
+        ``(B, h, w, 75)``.
+    """
+    batch, colours, h, w = image.shape
+    reach = 2 * dilation
+    padded = F.pad(image, (reach, reach, reach, reach), mode="replicate")
+    windows = F.unfold(padded, 5, dilation=dilation).view(batch, colours, 25, h, w)
+    windows = windows - windows.mean(2, keepdim=True)
+    floor = 25 * PLAIN_VARIANCE
+    windows = windows / torch.sqrt(windows.square().sum((1, 2), keepdim=True) + floor)
+    return windows.flatten(1, 2).permute(0, 2, 3, 1)
+
+
+@torch.no_grad()
+def likeness_volume(left: Tensor, right: Tensor, bins: int, dilations: tuple[int, ...]) -> Tensor:
+    """Compare half-resolution images at every shift, without learned weights.
+
+    Parameters
+    ----------
+    left, right
+        ``(B, 3, 2 h, 2 w)`` display-referred, half the resolution of the pictures.
+    bins
+        Bin j stands for the shifts 2 j and 2 j + 1 of these images.
+    dilations
+        Of the windows of :func:`window_vectors`.
+
+    Returns
+    -------
+    Tensor
+        ``(B, 2 len(dilations), bins, h, w)``; 0 where the right image has no such pixel.
+    """
+    batch, _, height, width = left.shape
+    x = torch.arange(width, device=left.device).view(-1, 1)
+    match = x - torch.arange(2 * bins, device=left.device)
+    groups = []
+    for dilation in dilations:
+        a, b = (window_vectors(image, dilation).flatten(0, 1) for image in (left, right))
+        every = torch.bmm(a, b.transpose(1, 2))
+        index = match.clamp(min=0).expand(batch * height, -1, -1)
+        shifts = every.gather(2, index) * (match >= 0)
+        shifts = shifts.view(batch, height // 2, 2, width // 2, 2, 2 * bins).mean((2, 4))
+        shifts = shifts.permute(0, 3, 1, 2)
+        groups.extend((shifts[:, 0::2], shifts[:, 1::2]))
+    return torch.stack(groups, dim=1)
+
+
 def soft_argmax(logits: Tensor, values: Tensor) -> Tensor:
     """Return the expected value over the bins, ``(B, 1, h, w)``.
 
@@ -75,6 +163,10 @@ def warp_right(right: Tensor, disparity_px: Tensor) -> Tensor:
     y = torch.arange(h, device=right.device, dtype=right.dtype).view(1, h, 1).expand_as(x)
     grid = torch.stack((2 * x / (w - 1) - 1, 2 * y / max(h - 1, 1) - 1), dim=-1)
     return F.grid_sample(right, grid, mode="bilinear", padding_mode="zeros", align_corners=True)
+
+
+PLAIN_VARIANCE = 5e-4
+"""Variance (display-referred, all colours) below which a window counts as plain: noise of about 0.013 per colour."""
 
 
 class VolumeAggregation(nn.Module):

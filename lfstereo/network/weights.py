@@ -61,7 +61,7 @@ def save_model(folder: Path, network: BdffNet, card: ModelCard, force: bool = Fa
         if not torch.isfinite(halves[name]).all():
             raise AssetError(f"{folder}: weight {name} is not finite as float16; train again with a lower rate")
     payload = serialise(halves)
-    card = dataclasses.replace(card, weights_sha256=hashlib.sha256(payload).hexdigest())
+    card = dataclasses.replace(card, sha256=hashlib.sha256(payload).hexdigest())
     with atomic_folder(folder, force) as scratch:
         (scratch / WEIGHTS).write_bytes(payload)
         (scratch / CARD).write_text(write_card(card), "utf-8")
@@ -82,9 +82,9 @@ def load_model(folder: Path) -> tuple[BdffNet, ModelCard]:
         raise AssetError(f"{path}: no such file; take the model from a fresh copy")
     payload = path.read_bytes()
     found = hashlib.sha256(payload).hexdigest()
-    if found != card.weights_sha256:
+    if found != card.sha256:
         raise AssetError(
-            f"{path}: sha256 is {found[:12]}…, expected {card.weights_sha256[:12]}… from the card; "
+            f"{path}: sha256 is {found[:12]}…, expected {card.sha256[:12]}… from the card; "
             "the file is damaged or from another version, take it from a fresh copy"
         )
     try:

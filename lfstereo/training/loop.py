@@ -52,6 +52,7 @@ def train(
     minutes: float | None = None,
     resume: bool = False,
     progress: Progress = silent,
+    stop_at: int | None = None,
 ) -> Counters:
     """Train one stage and leave a checkpoint.
 
@@ -66,7 +67,9 @@ def train(
     resume
         Go on from the folder's checkpoint.
     progress
-        Told the steps, or the seconds where a time is set.
+        Told how much of the run is done, in thousandths.
+    stop_at
+        Leave off after this step, to go on later.
 
     Raises
     ------
@@ -89,7 +92,7 @@ def train(
     counters = load_checkpoint(output, network, optimiser) if resume else Counters(recipe.stage, 0, 0.0)
     if resume:
         channels_last(network)
-    return _run(recipe, network, optimiser, counters, output, minutes, progress)
+    return _run(recipe, network, optimiser, counters, output, minutes, progress, stop_at)
 
 
 def _run(
@@ -100,12 +103,13 @@ def _run(
     output: Path,
     minutes: float | None,
     progress: Progress,
+    stop_at: int | None,
 ) -> Counters:
     loss_of = LOSSES[recipe.stage]
     step, elapsed, budget = counters.step, counters.elapsed_s, 60 * minutes if minutes else math.inf
     started = saved = time.monotonic()
     recent: list[float] = []
-    for batch in prefetched(_batches(recipe), step, recipe.steps):
+    for batch in prefetched(_batches(recipe), step, min(recipe.steps, stop_at or recipe.steps)):
         fraction = max(step / recipe.steps, elapsed / budget)
         if fraction >= 1:
             break

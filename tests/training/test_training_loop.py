@@ -1,0 +1,200 @@
+"""Training: losses with known values, steps that learn, a resumed run that ends at the same weights."""
+
+import dataclasses
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from lfstereo.cli.main import main
+from lfstereo.errors import AssetError, ConfigError
+from lfstereo.network.bdff_net import Architecture, BdffNet
+from lfstereo.network.stereo_net import Prediction
+from lfstereo.network.weights import load_model
+from lfstereo.training.batches import PairBatches, PoolBatches, prefetched
+from lfstereo.training.checkpoint import read_weights
+from lfstereo.training.evaluate import evaluate, held_out
+from lfstereo.training.evaluate import main as evaluate_main
+from lfstereo.training.loop import one_cycle, train
+from lfstereo.training.losses import bin_cross_entropy, image_loss, mean_absolute, staged_loss
+from lfstereo.training.pool import Pool, fill_pool, open_pool
+from lfstereo.training.publish import main as publish_main
+from lfstereo.training.publish import publish
+from lfstereo.training.recipe import Recipe, read_recipe
+from lfstereo.training.stages import LOSSES, PARTS, TRAINED, select_parts
+
+SMALL = Architecture(focus_width=4, edof_width=4, tail_width=4, stereo_width=16)
+SIZE = {"height": 64, "width": 64, "textures": 4, "batch": 2, "threads": 1}
+
+
+@pytest.fixture(scope="module")
+def pool(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Pool]:
+    folder = tmp_path_factory.mktemp("pool")
+    opened = open_pool(folder, 3, 64, 64, 1)
+    fill_pool(opened, 1, 4)
+    return folder, opened
+
+
+def test_losses_of_known_errors() -> None:
+    wanted, valid = torch.zeros(1, 1, 8, 8), torch.ones(1, 1, 8, 8, dtype=torch.bool)
+    half = torch.full((1, 1, 8, 8), 0.5)
+    assert float(mean_absolute(half, wanted, valid)) == 0.5
+    assert float(staged_loss(Prediction((half, half)), wanted, valid, wanted)) == pytest.approx(0.5 * 1.3)
+    assert float(image_loss(half, wanted, valid)) == pytest.approx(0.5)  # a constant error has no differences
+
+
+def test_cross_entropy_of_an_undecided_net_is_log_of_the_bins() -> None:
+    position, valid = torch.full((1, 2, 2), 3.4), torch.ones(1, 2, 2, dtype=torch.bool)
+    assert float(bin_cross_entropy(torch.zeros(1, 27, 2, 2), position, valid)) == pytest.approx(math.log(27), rel=1e-5)
+    logits = torch.full((1, 27, 2, 2), -40.0)
+    logits[:, 26] = 40.0
+    assert float(bin_cross_entropy(logits, torch.full((1, 2, 2), 30.0), valid)) == pytest.approx(0.0, abs=1e-5)
+
+
+def test_one_cycle_rises_then_falls() -> None:
+    rates = [one_cycle(f) for f in np.linspace(0, 1, 51)]
+    peak = int(np.argmax(rates))
+    assert rates[peak] == pytest.approx(1.0, abs=0.01)
+    assert all(np.diff(rates[:peak]) > 0) and all(np.diff(rates[peak:]) < 0)
+
+
+def test_batches_depend_on_the_step_alone(pool: tuple[Path, Pool]) -> None:
+    for source in (PairBatches(1, 2, 64, 64, 4), PoolBatches(pool[1], 1, 2)):
+        first, again, other = source(3), source(3), source(4)
+        assert torch.equal(first.left, again.left) and torch.equal(first.disparity, again.disparity)
+        assert not torch.equal(first.left, other.left)
+    cropped = PoolBatches(pool[1], 1, 2, (32, 48))(0)
+    assert tuple(cropped.left_stack.shape) == (2, 16, 3, 32, 48)
+    assert tuple(cropped.disparity.shape) == tuple(cropped.valid.shape) == (2, 1, 32, 48)
+
+
+def test_mirrored_batches_stay_a_stereo_pair(pool: tuple[Path, Pool]) -> None:
+    """Warping the right image by the disparity explains the left one better than leaving it does, mirrored or not."""
+    from lfstereo.network.volume import warp_right
+
+    for step in range(4):
+        batch = PoolBatches(pool[1], 1, 2)(step)
+        warped = warp_right(batch.right, batch.disparity * 100)
+        seen = batch.valid & (torch.arange(64).view(1, 1, 1, 64) - batch.disparity * 100 >= 0)
+        seen = seen & (warped.sum(1, keepdim=True) > 0)
+        if seen.sum() > 500:
+            assert mean_absolute(warped, batch.left, seen) < mean_absolute(batch.right, batch.left, seen)
+
+
+def test_prefetching_passes_errors_on() -> None:
+    def broken(step: int) -> None:
+        raise ConfigError(f"step {step}")
+
+    with pytest.raises(ConfigError, match="step 5"):
+        list(prefetched(broken, 5, 7))  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("stage", sorted(LOSSES))
+def test_a_few_steps_reduce_the_loss(stage: str, pool: tuple[Path, Pool]) -> None:
+    torch.manual_seed(0)
+    torch.set_num_threads(1)
+    network = BdffNet(SMALL)
+    before = {name: value.clone() for name, value in network.named_parameters()}
+    optimiser = torch.optim.AdamW(select_parts(network, stage), 1e-3)
+    batch = PoolBatches(pool[1], 1, 2)(0)
+    losses = []
+    for _ in range(5):
+        optimiser.zero_grad()
+        loss = LOSSES[stage](network, batch)
+        loss.backward()
+        optimiser.step()
+        losses.append(float(loss.detach()))
+    assert min(losses[1:]) < losses[0]
+    changed = {name.split(".")[0] for name, value in network.named_parameters() if not torch.equal(value, before[name])}
+    assert changed == set(TRAINED[stage])
+
+
+def test_a_resumed_run_ends_at_the_same_weights(tmp_path: Path) -> None:
+    recipe = Recipe(stage="stereo", steps=4, **SIZE)
+    train(recipe, SMALL, tmp_path / "whole")
+    half = dataclasses.replace(recipe, steps=4)
+    train(half, SMALL, tmp_path / "parts", stop_at=2)
+    done = train(half, SMALL, tmp_path / "parts", resume=True)
+    assert done.step == 4
+    whole, parts = read_weights(tmp_path / "whole"), read_weights(tmp_path / "parts")
+    assert all(torch.equal(whole[name], parts[name]) for name in whole)
+
+
+def test_a_run_ends_when_its_minutes_are_over(tmp_path: Path) -> None:
+    done = train(Recipe(stage="stereo", steps=10000, **SIZE), SMALL, tmp_path, minutes=0.01)
+    assert 0 < done.step < 10000
+
+
+def test_resume_without_a_checkpoint(tmp_path: Path) -> None:
+    with pytest.raises(AssetError, match="no such checkpoint"):
+        train(Recipe(stage="stereo", **SIZE), SMALL, tmp_path, resume=True)
+
+
+def test_stage_without_a_pool(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match="no pool is named"):
+        train(Recipe(stage="edof", **SIZE), SMALL, tmp_path)
+
+
+def test_empty_pool(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match="0 samples are rendered"):
+        PoolBatches(open_pool(tmp_path, 2, 64, 64, 1), 1, 2)(0)
+
+
+def test_pool_of_another_size(pool: tuple[Path, Pool]) -> None:
+    with pytest.raises(ConfigError, match="holds a pool of"):
+        open_pool(pool[0], 4, 64, 64, 1)
+
+
+def test_unknown_part_to_start_from(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match="expected PART=FOLDER"):
+        train(Recipe(stage="stereo", start_from=("head=there",), **SIZE), SMALL, tmp_path)
+
+
+def test_all_shipped_recipes_can_be_read() -> None:
+    from lfstereo.assets import asset_folder
+
+    recipes = sorted((asset_folder("models") / "recipes").glob("*.toml"))
+    assert len(recipes) >= 6
+    for path in recipes:
+        recipe, architecture = read_recipe(path)
+        assert recipe.stage in {"pool", *TRAINED}
+        assert architecture == Architecture()
+
+
+def test_train_command_then_publish_then_evaluate(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = 'stage = "stereo"\nsteps = 2\nbatch = 2\nheight = 64\nwidth = 64\ntextures = 4\n'
+    (tmp_path / "tiny.toml").write_text(text)
+    words = ["train", str(tmp_path / "tiny.toml"), "-o", str(tmp_path / "run")]
+    assert main(words) == 0
+    assert main(words) == 3
+    assert "add --resume" in capsys.readouterr().err
+    parts = [f"{part}={tmp_path / 'run'}" for part in PARTS]
+    assert publish_main([*parts, "-o", str(tmp_path / "tiny-v1"), "--stages", str(tmp_path / "run")]) == 0
+    _, card = load_model(tmp_path / "tiny-v1")
+    assert card.name == "tiny" and card.training.stages[0].startswith("stereo: 2 steps")
+    assert evaluate_main([str(tmp_path / "tiny-v1"), "--count", "1", "--height", "64", "--width", "64"]) == 0
+    assert "fused_visible" in capsys.readouterr().out
+
+
+def test_publish_needs_every_part_and_a_version(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match="no run is given for edof"):
+        publish({}, tmp_path / "x-v1", [], "none")
+    with pytest.raises(ConfigError, match="ending in a version"):
+        publish(dict.fromkeys(PARTS, tmp_path), tmp_path / "x", [], "none")
+
+
+def test_evaluation_of_a_perfect_answer() -> None:
+    samples = held_out(1, 64, 64, 0.1, 3)
+
+    class Oracle(BdffNet):
+        def forward(self, left, right, range_px=(0.0, 100.0)):  # type: ignore[no-untyped-def]
+            found = super().forward(left, right, range_px)
+            truth = torch.from_numpy(samples[0].disparity[0] / 100)[None, None]
+            return dataclasses.replace(found, fused=truth)
+
+    rows = {row.part: row for row in evaluate(Oracle(SMALL), samples)}
+    assert rows["fused"].mae_px == pytest.approx(0.0, abs=1e-4)
+    assert rows["fused"].bad == (0.0, 0.0, 0.0)
+    assert rows["constant"].mae_px > 1
