@@ -13,12 +13,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+import torch
+import torch.nn.functional as F
 from torch import Tensor, nn
 
 from lfstereo.conventions import DISPARITY_RANGE_PX, SLICES_DEFAULT
+from lfstereo.network.blocks import ConvBlock, initialise
 from lfstereo.network.edof_net import EdofNet
 from lfstereo.network.focus_net import FocusNet, PlainStack
 from lfstereo.network.stereo_net import Prediction, StereoNet
+from lfstereo.network.volume import likeness, warp_right
 from lfstereo.network.volume_net import FocusVolumeNet
 from lfstereo.options import option
 
@@ -37,7 +41,7 @@ class Architecture:
         "correlation", "the paper's concatenation, or a correlation volume"
     )
     residual: bool = option(True, "add the mean slice to EDoF-Net's, the input map to each tail's output")
-    fusion_guide: bool = option(True, "show the left all-in-focus image to the fusion as well")
+    fusion_guide: bool = option(True, "show the fusion also the left sharp image and where each cue can be trusted")
 
     @property
     def multiple(self) -> int:
@@ -75,7 +79,7 @@ class BdffNet(nn.Module):
         self.focus = focus(architecture.focus_width, architecture.slices)
         self.guided = PlainStack(4, tail, wide)
         self.stereo = StereoNet(architecture.stereo_width, architecture.stereo)
-        self.fusion = PlainStack(5 if architecture.fusion_guide else 2, tail, wide)
+        self.fusion: nn.Module = Blend(tail) if architecture.fusion_guide else PlainStack(2, tail, wide)
 
     def forward(
         self, left: Tensor, right: Tensor, range_px: tuple[float, float] = (0.0, DISPARITY_RANGE_PX)
@@ -91,16 +95,58 @@ class BdffNet(nn.Module):
             stereo tells px.
         """
         edof_left, edof_right = self.edof(left), self.edof(right)
-        focus = to_range(self.focus(left).final, range_px)
+        by_focus = self.focus(left)
+        focus = to_range(by_focus.final, range_px)
         guided = self.guided(focus, edof_left - 0.5)
         stereo = self.stereo(edof_left, edof_right)
-        return PairPrediction(edof_left, focus, guided, stereo, self.fuse(stereo.final, guided, edof_left))
+        if self.architecture.fusion_guide:
+            support = _support(edof_left, edof_right, stereo.final)
+            trust = torch.cat((support, _sureness(stereo, support), _sureness(by_focus, support)), dim=1)
+            fused = self.fusion(stereo.final, guided, edof_left - 0.5, trust)
+        else:
+            fused = self.fusion(stereo.final, guided)
+        return PairPrediction(edof_left, focus, guided, stereo, fused)
 
-    def fuse(self, stereo: Tensor, guided: Tensor, edof_left: Tensor) -> Tensor:
-        """Join the two maps."""
-        parts = (stereo, guided, edof_left - 0.5) if self.architecture.fusion_guide else (stereo, guided)
-        fused: Tensor = self.fusion(*parts)
-        return fused
+
+class Blend(nn.Module):
+    """Ten 3 x 3 convolutions that weigh stereo against focus, and correct the weighted map.
+
+    The published fusion maps two disparity maps to one. Here the convolutions also see the left sharp image and, per
+    pixel, how well the stereo match explains the image and how sure either cue is, and they return a weight and a
+    correction; untrained, the answer is nearly the stereo map.
+    """
+
+    def __init__(self, width: int) -> None:
+        super().__init__()
+        last = nn.Conv2d(width, 2, 3, 1, 1)
+        self.body = nn.Sequential(ConvBlock(8, width), *(ConvBlock(width, width) for _ in range(8)), last)
+        initialise(self)
+        nn.init.normal_(last.weight, std=1e-3)
+
+    def forward(self, stereo: Tensor, guided: Tensor, image: Tensor, trust: Tensor) -> Tensor:
+        """Join ``(B, 1, H, W)`` maps; ``image`` has 3, ``trust`` 3 channels."""
+        weight, correction = self.body(torch.cat((stereo, guided, image, trust), dim=1)).chunk(2, dim=1)
+        share = torch.sigmoid(weight - 3.0)
+        joined: Tensor = (1 - share) * stereo + share * guided + 0.1 * correction
+        return joined
+
+
+@torch.no_grad()
+def _support(left: Tensor, right: Tensor, disparity: Tensor) -> Tensor:
+    """Likeness of each left pixel to its stereo match, -1 to 1; -1 where the match lies outside the right image."""
+    shift = disparity * DISPARITY_RANGE_PX
+    alike = likeness(left, warp_right(right, shift), 7)
+    x = torch.arange(left.shape[3], device=left.device, dtype=left.dtype)
+    return torch.where(x - shift < 0, torch.full_like(alike, -1.0), alike)
+
+
+@torch.no_grad()
+def _sureness(prediction: Prediction, like: Tensor) -> Tensor:
+    """Highest probability of any bin, at the pictures' resolution; 0 for networks without bins."""
+    if not prediction.logits:
+        return torch.zeros_like(like)
+    highest = F.softmax(prediction.logits[-1], dim=1).amax(1, keepdim=True)
+    return F.interpolate(highest, size=like.shape[2:], mode="bilinear", align_corners=False)
 
 
 def to_range(fraction: Tensor, range_px: tuple[float, float]) -> Tensor:

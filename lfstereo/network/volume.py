@@ -67,12 +67,12 @@ def likeness(left: Tensor, right: Tensor, window: int) -> Tensor:
     ----------
     Lewis, "Fast normalized cross-correlation" (1995), eq. 2, with a floor under the variances.
     """
-    colours = left.shape[1]
     moments = _box(torch.cat((left, right, left * left, right * right, left * right), dim=1), window)
-    mean_l, mean_r, square_l, square_r, product = moments.split(colours, dim=1)
+    mean_l, mean_r, square_l, square_r, product = torch.chunk(moments, 5, dim=1)
     variance_l = (square_l - mean_l * mean_l).sum(1, keepdim=True).clamp(min=0) + PLAIN_VARIANCE
     variance_r = (square_r - mean_r * mean_r).sum(1, keepdim=True).clamp(min=0) + PLAIN_VARIANCE
-    return (product - mean_l * mean_r).sum(1, keepdim=True) / torch.sqrt(variance_l * variance_r)
+    covariance = (product - mean_l * mean_r).sum(1, keepdim=True)
+    return covariance * torch.rsqrt(variance_l * variance_r)
 
 
 def _box(image: Tensor, window: int) -> Tensor:
@@ -124,7 +124,7 @@ def likeness_volume(left: Tensor, right: Tensor, bins: int, dilations: tuple[int
     batch, _, height, width = left.shape
     x = torch.arange(width, device=left.device).view(-1, 1)
     match = x - torch.arange(2 * bins, device=left.device)
-    groups = []
+    groups: list[Tensor] = []
     for dilation in dilations:
         a, b = (window_vectors(image, dilation).flatten(0, 1) for image in (left, right))
         every = torch.bmm(a, b.transpose(1, 2))

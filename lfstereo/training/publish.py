@@ -30,7 +30,8 @@ DEVIATIONS = (
     "Focus-Net: a focus volume (shared weights per slice, expected slice) in place of four branches over the "
     "concatenated slices, for the same reason",
     "EDoF-Net, Focus-Net-Guided, BDfF-Net: convolutions as published, added to the mean slice or the incoming map",
-    "BDfF-Net's ten convolutions also see the left all-in-focus image",
+    "BDfF-Net's ten convolutions also see the left all-in-focus image and how far each cue can be trusted, and return "
+    "a weight between stereo and focus and a correction",
 )
 LIMITS = (
     "16 slices, evenly spaced, focus disparities within -1 to 104 px",
