@@ -14,7 +14,7 @@ from lfstereo.lenslet.grid import LensletGrid
 from lfstereo.lenslet.options import GridOptions
 from lfstereo.lightfield.field import LightField
 from lfstereo.lightfield.options import DecodeOptions, ViewOptions
-from lfstereo.lightfield.resample import sample_views, sample_weights, view_sampling, views_inside
+from lfstereo.lightfield.resample import sample_views, view_sampling
 from lfstereo.progress import Progress, silent
 
 _RIM_PX = 0.8
@@ -88,12 +88,7 @@ def views_from(
     sampling = view_sampling(grid, options.view.view_step_px)
     image = develop(capture, shading, options.develop)
     progress(30, 100)
-    views = sample_views(image, grid, sampling, count, _part(progress, 30, 90))
-    del image
-    np.maximum(views, 0, out=views)
-    views[~views_inside(grid, sampling, count)] = 0
-    weight = sample_weights(shading, grid, sampling, count)
-    progress(100, 100)
+    views, weight = sample_views(image, shading, grid, sampling, count, _part(progress, 30, 100))
     return LightField(
         views=views, weight=weight, sampling=sampling, serial=capture.metadata.serial, source=capture.source
     )

@@ -4,16 +4,20 @@ from __future__ import annotations
 
 import os
 from concurrent.futures import ThreadPoolExecutor
+from typing import TypeAlias
 
 import numba
 import numpy as np
+import numpy.typing as npt
 
 from lfstereo.arrays import Float32, Float64, Rgb, UInt8, Views
 from lfstereo.lenslet.grid import LensletGrid
 from lfstereo.lightfield.field import ViewSampling
+from lfstereo.lightfield.hexagons import PHASES, hexagon_weights
 from lfstereo.progress import Progress, silent
 
-_ROWS_PER_TASK = 8
+_ROWS_PER_TASK = 24
+IntArray: TypeAlias = npt.NDArray[np.int64]
 
 
 def view_sampling(grid: LensletGrid, view_step_px: float) -> ViewSampling:
@@ -56,17 +60,24 @@ def view_offsets(sampling: ViewSampling, count: int) -> Float64:
 
 
 def sample_views(
-    image: Rgb | Float32, grid: LensletGrid, sampling: ViewSampling, count: int, progress: Progress = silent
-) -> Views | Float32:
-    """Read all views from an image on the raw sensor's pixels.
+    image: Rgb,
+    shading: Float32,
+    grid: LensletGrid,
+    sampling: ViewSampling,
+    count: int,
+    progress: Progress = silent,
+) -> tuple[Views, UInt8]:
+    """Read all views and the weights of their samples from an image on the raw sensor's pixels.
 
-    Inside a micro-image by cubic convolution at the exact sub-pixel position; then along each row of lenslets
-    from their spacing to the square columns, again by cubic convolution.
+    Inside a micro-image by cubic convolution at the exact sub-pixel position; then from the hexagonal lattice of
+    lenslets to the square columns by the weights of :func:`hexagon_weights`, and nothing in between.
 
     Parameters
     ----------
     image
-        ``(H, W, 3)`` linear RGB, or ``(H, W)``.
+        ``(H, W, 3)`` linear RGB.
+    shading
+        ``(H, W)`` float32 relative illumination of the same pixels, 1 = full light.
     grid
         The lenslet grid.
     sampling
@@ -78,53 +89,50 @@ def sample_views(
 
     Returns
     -------
-    ``(T, S, V, U, 3)`` or ``(T, S, V, U)`` float32. Beyond the border of the sensor the last pixel counts.
+    Views ``(T, S, V, U, 3)`` float32, not below 0, and weights ``(T, S, V, U)`` uint8, 255 = full light. Views
+    that would look through a neighbouring lenslet are 0 in both; beyond the sensor the last pixel counts, with
+    weight 0.
 
     References
     ----------
     Keys, "Cubic convolution interpolation for digital image processing" (IEEE TASSP 1981), eq. 15 (a = -1/2).
     """
-    channels = 1 if image.ndim == 2 else 3
-    planes = image.reshape(*image.shape[:2], channels)
     columns = view_columns(grid)
-    out = np.empty((count, count, grid.rows, columns, channels), np.float32)
-    offsets = np.ascontiguousarray(view_offsets(sampling, count).reshape(-1, 2))
-    flat_out = out.reshape(count * count, grid.rows, columns, channels)
+    views = np.zeros((count, count, grid.rows, columns, 3), np.float32)
+    weights = np.zeros((count, count, grid.rows, columns), np.uint8)
+    inside = views_inside(grid, sampling, count).ravel()
+    offsets = np.ascontiguousarray(view_offsets(sampling, count).reshape(-1, 2)[inside])
+    numbers = np.flatnonzero(inside)
     centres = grid.centres()
     first, step = _column_positions(grid, sampling)
+    table = hexagon_weights()
+    flat_views = views.reshape(count * count, grid.rows, columns, 3)
+    flat_weights = weights.reshape(count * count, grid.rows, columns)
     starts = list(range(0, grid.rows, _ROWS_PER_TASK))
 
     def task(start: int) -> None:
         stop = min(start + _ROWS_PER_TASK, grid.rows)
-        _sample_rows(planes, centres[start:stop], offsets, first[start:stop], step, flat_out[:, start:stop])
+        shifted = grid.first_shifted_row
+        _sample_rows(
+            image,
+            shading,
+            centres,
+            offsets,
+            numbers,
+            first,
+            step,
+            shifted,
+            table,
+            start,
+            stop,
+            flat_views,
+            flat_weights,
+        )
 
     with ThreadPoolExecutor(max_workers=os.cpu_count() or 1) as pool:
         for done, _ in enumerate(pool.map(task, starts)):
             progress(done + 1, len(starts))
-    return out if image.ndim == 3 else out[..., 0]
-
-
-def sample_weights(shading: Float32, grid: LensletGrid, sampling: ViewSampling, count: int) -> UInt8:
-    """Read the confidence of every view sample from the illumination of the pixels.
-
-    Parameters
-    ----------
-    shading
-        ``(H, W)`` float32 relative illumination, 1 = full light.
-    grid, sampling, count
-        As for :func:`sample_views`.
-
-    Returns
-    -------
-    ``(T, S, V, U)`` uint8, 255 = full light; 0 where the view would look through a neighbouring lenslet.
-    """
-    out = np.empty((count, count, grid.rows, view_columns(grid)), np.uint8)
-    inside = views_inside(grid, sampling, count)
-    sampled = sample_views(shading, grid, sampling, count)
-    for t in range(count):
-        for s in range(count):
-            out[t, s] = np.clip(sampled[t, s] * 255 + 0.5, 0, 255) if inside[t, s] else 0
-    return out
+    return views, weights
 
 
 def views_inside(
@@ -158,42 +166,83 @@ def _keys(f: float) -> tuple[float, float, float, float]:  # pragma: no cover
 
 
 @numba.njit(cache=True, nogil=True, fastmath=True)  # type: ignore[untyped-decorator]
-def _sample_rows(
-    image: Float32, centres: Float64, offsets: Float64, first: Float64, step: float, out: Float32
+def _sample_lenslets(
+    image: Float32, shading: Float32, centres: Float64, offsets: Float64, out: Float32
 ) -> None:  # pragma: no cover
-    """Fill ``out`` ``(views, rows, columns, channels)`` for some rows of lenslets."""
-    height, width, channels = image.shape
-    views, rows, columns = out.shape[0], out.shape[1], out.shape[2]
-    lenslets = centres.shape[1]
-    hexagons = np.empty((views, lenslets, channels), np.float32)
-    for v in range(rows):
-        for k in range(lenslets):
-            cx, cy = centres[v, k, 0], centres[v, k, 1]
-            for n in range(views):
-                x, y = cx + offsets[n, 0], cy + offsets[n, 1]
-                left, top = int(np.floor(x)), int(np.floor(y))
-                wx, wy = _keys(x - left), _keys(y - top)
-                for c in range(channels):
-                    hexagons[n, k, c] = 0.0
-                for b in range(4):
-                    row = min(max(top - 1 + b, 0), height - 1)
-                    for a in range(4):
-                        column = min(max(left - 1 + a, 0), width - 1)
-                        weight = np.float32(wy[b] * wx[a])
-                        for c in range(channels):
-                            hexagons[n, k, c] += weight * image[row, column, c]
-        for u in range(columns):
+    """Fill ``out`` ``(views, lenslets, 4)``: RGB and shading of one row of lenslets."""
+    height, width = shading.shape
+    for k in range(centres.shape[0]):
+        for n in range(offsets.shape[0]):
+            x, y = centres[k, 0] + offsets[n, 0], centres[k, 1] + offsets[n, 1]
+            left, top = int(np.floor(x)), int(np.floor(y))
+            wx, wy = _keys(x - left), _keys(y - top)
+            red = green = blue = light = np.float32(0.0)
+            for b in range(4):
+                row = min(max(top - 1 + b, 0), height - 1)
+                for a in range(4):
+                    column = min(max(left - 1 + a, 0), width - 1)
+                    weight = np.float32(wy[b] * wx[a])
+                    red += weight * image[row, column, 0]
+                    green += weight * image[row, column, 1]
+                    blue += weight * image[row, column, 2]
+                    light += weight * shading[row, column]
+            out[n, k, 0], out[n, k, 1], out[n, k, 2] = red, green, blue
+            on_sensor = x >= 0.0 and y >= 0.0 and x <= width - 1.0 and y <= height - 1.0
+            out[n, k, 3] = light if on_sensor else np.float32(0.0)
+
+
+@numba.njit(cache=True, nogil=True, fastmath=True)  # type: ignore[untyped-decorator]
+def _sample_rows(
+    image: Float32,
+    shading: Float32,
+    centres: Float64,
+    offsets: Float64,
+    numbers: IntArray,
+    first: Float64,
+    step: float,
+    first_shifted_row: int,
+    table: Float32,
+    start: int,
+    stop: int,
+    views: Float32,
+    weights: UInt8,
+) -> None:  # pragma: no cover
+    """Fill rows ``start`` to ``stop`` of the views, keeping three rows of lenslets at a time."""
+    rows, lenslets = centres.shape[0], centres.shape[1]
+    ring = np.zeros((3, offsets.shape[0], lenslets, 4), np.float32)
+    for v in range(max(start - 1, 0), min(start + 1, rows)):
+        _sample_lenslets(image, shading, centres[v], offsets, ring[v % 3])
+    for v in range(start, stop):
+        if v + 1 < rows:
+            _sample_lenslets(image, shading, centres[v + 1], offsets, ring[(v + 1) % 3])
+        # The lattice is symmetric about a row, so beyond the first and last row the other neighbour serves.
+        above = v - 1 if v > 0 else min(1, rows - 1)
+        below = v + 1 if v + 1 < rows else max(rows - 2, 0)
+        shifted = (v + first_shifted_row) % 2 == 0
+        half = 1 if shifted else 0
+        for u in range(views.shape[2]):
             position = min(max(first[v] + u * step, 0.0), lenslets - 1.0)
-            base = int(position)
-            w = _keys(position - base)
-            k0, k1 = max(base - 1, 0), base
-            k2, k3 = min(base + 1, lenslets - 1), min(base + 2, lenslets - 1)
-            w0, w1, w2, w3 = np.float32(w[0]), np.float32(w[1]), np.float32(w[2]), np.float32(w[3])
-            for n in range(views):
-                for c in range(channels):
-                    out[n, v, u, c] = (
-                        w0 * hexagons[n, k0, c]
-                        + w1 * hexagons[n, k1, c]
-                        + w2 * hexagons[n, k2, c]
-                        + w3 * hexagons[n, k3, c]
-                    )
+            nearest = int(np.floor(position + 0.5))
+            phase = int(np.floor((position - nearest + 0.5) * PHASES + 0.5))
+            for n in range(offsets.shape[0]):
+                red = green = blue = light = np.float32(0.0)
+                for tap in range(13):
+                    if tap < 5:
+                        source, k = v, nearest + tap - 2
+                    elif tap < 9:
+                        source, k = above, nearest + tap - 7 + half
+                    else:
+                        source, k = below, nearest + tap - 11 + half
+                    k = min(max(k, 0), lenslets - 1)
+                    weight = table[phase, tap]
+                    red += weight * ring[source % 3, n, k, 0]
+                    green += weight * ring[source % 3, n, k, 1]
+                    blue += weight * ring[source % 3, n, k, 2]
+                    light += weight * ring[source % 3, n, k, 3]
+                zero = np.float32(0.0)
+                views[numbers[n], v, u, 0] = max(red, zero)
+                views[numbers[n], v, u, 1] = max(green, zero)
+                views[numbers[n], v, u, 2] = max(blue, zero)
+                weights[numbers[n], v, u] = int(
+                    min(max(light, zero), np.float32(1.0)) * np.float32(255) + np.float32(0.5)
+                )
