@@ -59,6 +59,9 @@ def read_camera_profile(camera: str, bits: int | None = None) -> FrameMetadata:
 def read_mosaic_image(path: Path, camera: str) -> Capture:
     """Read a raw mosaic stored as a JPEG, PNG or TIFF of one channel.
 
+    The Bayer pattern is the highest spatial frequency there is, and JPEG drops that first: where a mosaic is dim or
+    smooth its four sites come back equal. A white balance would tint such places, so a JPEG gets neutral gains.
+
     Parameters
     ----------
     path
@@ -91,6 +94,8 @@ def read_mosaic_image(path: Path, camera: str) -> Capture:
         )
     if pixels.dtype == np.uint16:
         metadata = replace(metadata, bits_per_pixel=16, endianness="little")
+    if path.suffix.lower() in (".jpg", ".jpeg"):
+        metadata = replace(metadata, white_balance=(1.0, 1.0, 1.0, 1.0))
     return Capture(mosaic=pixels.astype(np.uint16), metadata=metadata, source=str(path))
 
 

@@ -114,3 +114,11 @@ def test_real_photograph(real_data: Path) -> None:
     assert found.mosaic.shape == (3280, 3280)
     assert (found.metadata.black[0], found.metadata.bits_per_pixel) == (16.0, 8)
     assert 10 <= np.percentile(found.mosaic, 1) <= 20  # the black level, as stored
+
+
+def test_a_jpeg_gets_neutral_gains_and_a_png_the_profile_s(tmp_path: Path) -> None:
+    flat = np.full((3280, 3280), 100, np.uint8)
+    for suffix, blue in ((".jpg", 1.0), (".png", 1.48)):
+        iio.imwrite(tmp_path / f"flat{suffix}", flat)
+        capture = read_mosaic_image(tmp_path / f"flat{suffix}", "lytro-f01")
+        assert capture.metadata.white_balance[3] == blue
