@@ -1,0 +1,59 @@
+"""Where the corners of a target were seen: the measurements that a calibration is computed from."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from lfstereo.arrays import Bool, Float64
+from lfstereo.errors import ShapeError
+
+
+@dataclass(frozen=True, slots=True)
+class Sightings:
+    """Corners of one target that one camera saw in one shot, in all views together."""
+
+    source: str
+    """Capture it comes from, for messages."""
+    serial: str
+    """Camera serial number, empty where unknown."""
+    corner: np.ndarray[tuple[int], np.dtype[np.intp]]
+    """``(M,)`` row of ``Target.points``."""
+    offset: Float64
+    """``(M, 2)`` position of the view inside the micro-images, sensor px from the centre; 0 for a pinhole camera."""
+    place: Float64
+    """``(M, 2)`` (x, y) of the corner on the lattice of micro-image centres, sensor px."""
+    weight: Float64
+    """``(M,)`` confidence, 1 = full; 0 = not to be used."""
+
+    def __post_init__(self) -> None:
+        count = len(self.corner)
+        for name, shape in (("offset", (count, 2)), ("place", (count, 2)), ("weight", (count,))):
+            if getattr(self, name).shape != shape:
+                raise ShapeError(f"{self.source}: {name} has shape {getattr(self, name).shape}, expected {shape}")
+
+    def centre_view(self) -> tuple[np.ndarray[tuple[int], np.dtype[np.intp]], Float64]:
+        """Return the corners seen in the view nearest to the centre and their places ``(N, 2)``."""
+        used = np.flatnonzero(self.weight > 0)
+        away = np.abs(self.offset[used]).max(axis=1)
+        nearest = used[away <= away.min() + 1e-6]
+        first = nearest[np.all(self.offset[nearest] == self.offset[nearest[0]], axis=1)]
+        return self.corner[first], self.place[first]
+
+
+def reach_px(shots: Sequence[Sightings]) -> tuple[Float64, Float64]:
+    """Return the smallest and largest place seen in any shot, ``(2,)`` each."""
+    low = np.min([shot.place[shot.weight > 0].min(axis=0) for shot in shots], axis=0)
+    high = np.max([shot.place[shot.weight > 0].max(axis=0) for shot in shots], axis=0)
+    return low, high
+
+
+def usable(shot: Sightings, least: int = 8) -> bool:
+    """Return whether a shot shows enough corners, not all in one line, for a pose."""
+    if not np.any(shot.weight > 0):
+        return False
+    _, place = shot.centre_view()
+    spread: Bool = np.linalg.svd(place - place.mean(axis=0), compute_uv=False) > 1e-3 * (1 + np.ptp(place))
+    return len(place) >= least and bool(spread.all())
