@@ -61,12 +61,13 @@ def focal_stack(light_field: LightField, near_px: float, enlarge: int) -> FocalS
     return FocalStack(slices, focused * enlarge, stack.aperture_ratio, stack.source)
 
 
-def estimate(left: LightField, right: LightField, near_px: float, enlarge: int, model: str) -> np.ndarray:
+def estimate(left: LightField, right: LightField, near_px: float, enlarge: int, model: str | None) -> np.ndarray:
     """Return the network's disparity in px of the photographs."""
     from lfstereo.network.estimate import estimate_disparity, load_network
 
     stacks = [focal_stack(field, near_px, enlarge) for field in (left, right)]
-    found = estimate_disparity(*stacks, load_network(model)).disparity / enlarge
+    network = load_network() if model is None else load_network(model)
+    found = estimate_disparity(*stacks, network).disparity / enlarge
     return cv2.resize(found, left.views.shape[3:1:-1], interpolation=cv2.INTER_AREA)
 
 
@@ -74,7 +75,7 @@ def main() -> None:
     """Print the errors of the network and of semi-global matching on the centre views."""
     parser = argparse.ArgumentParser(description="Depth from nine photographs along a rail.")
     parser.add_argument("folder", type=Path, help="folder with im0.ppm .. im8.ppm and disp2.pgm")
-    parser.add_argument("--model", default="bdffnet-r16-v1", help="model name or folder; 'none': only the baselines")
+    parser.add_argument("--model", help="model name or folder; unset: the shipped one; 'none': only the baselines")
     parser.add_argument("--near", type=float, default=24.0, help="largest disparity to look for, px")
     parser.add_argument("--enlarge", type=int, default=2, help="times the stacks are enlarged for the network")
     parser.add_argument("-o", "--output", type=Path, help="write the disparity maps side by side to this PNG file")
