@@ -164,7 +164,7 @@ def test_all_shipped_recipes_can_be_read() -> None:
 
 
 def test_train_command_then_publish_then_evaluate(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    text = 'stage = "stereo"\nsteps = 2\nbatch = 2\nheight = 64\nwidth = 64\ntextures = 4\n'
+    text = 'stage = "stereo"\nsteps = 2\nbatch = 2\nheight = 64\nwidth = 64\ntextures = 4\nthreads = 1\n'
     (tmp_path / "tiny.toml").write_text(text)
     words = ["train", str(tmp_path / "tiny.toml"), "-o", str(tmp_path / "run")]
     assert main(words) == 0

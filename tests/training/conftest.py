@@ -1,0 +1,9 @@
+"""One thread: small tensors gain nothing from more, and a busy machine makes several threads wait for each other."""
+
+import pytest
+import torch
+
+
+@pytest.fixture(autouse=True, scope="session")
+def one_thread() -> None:
+    torch.set_num_threads(1)
