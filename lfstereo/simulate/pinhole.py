@@ -27,7 +27,14 @@ def render(scene: Scene, pinhole: Pinhole, oversample: int = 4) -> Rgb:
     """Return the picture, ``(V, U, 3)`` linear sRGB, each px the mean of ``oversample``^2 rays over its area."""
     picture = np.zeros((*pinhole.size, 3), np.float32)
     _render_rows(
-        picture, _numbers(pinhole), scene.primitives, scene.light, scene.light_maps, oversample, 1 / pinhole.focal_px
+        picture,
+        _numbers(pinhole),
+        scene.primitives,
+        scene.extents,
+        scene.light,
+        scene.light_maps,
+        oversample,
+        1 / pinhole.focal_px,
     )
     return picture
 
@@ -35,7 +42,7 @@ def render(scene: Scene, pinhole: Pinhole, oversample: int = 4) -> Rgb:
 def depth(scene: Scene, pinhole: Pinhole) -> Float32:
     """Return z (m) of the first surface through each px centre, ``(V, U)``; infinite where there is none."""
     z = np.full(pinhole.size, np.inf, np.float32)
-    _depth_rows(z, _numbers(pinhole), scene.primitives)
+    _depth_rows(z, _numbers(pinhole), scene.primitives, scene.extents)
     return z
 
 
@@ -56,6 +63,7 @@ def _render_rows(
     picture: Float32,
     pinhole: Float64,
     scene: Float64,
+    extents: Float64,
     light: Float64,
     light_maps: Float32,
     oversample: int,
@@ -63,14 +71,14 @@ def _render_rows(
 ) -> None:
     rays = oversample * oversample
     for v in numba.prange(picture.shape[0]):
-        among = np.empty(scene.shape[0], np.int64)
+        among, entry = np.empty(scene.shape[0], np.int64), np.empty(scene.shape[0])
         for u in range(picture.shape[1]):
             x, y = (u - pinhole[1]) / pinhole[0], (v - pinhole[2]) / pinhole[0]
-            count = candidates(scene, x, y, 1.0, 0.0, among)
+            count = candidates(scene, extents, x, y, 1.0, 0.0, 1 / pinhole[0], among, entry)
             for k in range(rays):
                 dx = x + ((k % oversample + 0.5) / oversample - 0.5) / pinhole[0]
                 dy = y + ((k // oversample + 0.5) / oversample - 0.5) / pinhole[0]
-                which, t = nearest(scene, among, count, 0.0, 0.0, 0.0, dx, dy, 1.0)
+                which, t = nearest(scene, among, entry, count, 0.0, 0.0, 0.0, dx, dy, 1.0)
                 if which < 0:
                     continue
                 r, g, b = shade(scene, light, light_maps, which, t * dx, t * dy, t, dx, dy, 1.0, spot_per_m * t)
@@ -80,21 +88,21 @@ def _render_rows(
 
 
 @compiled_parallel
-def _depth_rows(z: Float32, pinhole: Float64, scene: Float64) -> None:
+def _depth_rows(z: Float32, pinhole: Float64, scene: Float64, extents: Float64) -> None:
     for v in numba.prange(z.shape[0]):
-        among = np.empty(scene.shape[0], np.int64)
+        among, entry = np.empty(scene.shape[0], np.int64), np.empty(scene.shape[0])
         for u in range(z.shape[1]):
             dx, dy = (u - pinhole[1]) / pinhole[0], (v - pinhole[2]) / pinhole[0]
-            count = candidates(scene, dx, dy, 1.0, 0.0, among)
-            which, t = nearest(scene, among, count, 0.0, 0.0, 0.0, dx, dy, 1.0)
+            count = candidates(scene, extents, dx, dy, 1.0, 0.0, 0.0, among, entry)
+            which, t = nearest(scene, among, entry, count, 0.0, 0.0, 0.0, dx, dy, 1.0)
             if which >= 0:
                 z[v, u] = t
 
 
 @compiled_parallel
 def _visible_points(seen: Bool, points: Float64, eye: Float64, scene: Float64, tolerance: float) -> None:
-    among = np.arange(scene.shape[0])
+    among, whenever = np.arange(scene.shape[0]), np.zeros(scene.shape[0])
     for n in numba.prange(points.shape[0]):
         dx, dy, dz = points[n, 0] - eye[0], points[n, 1] - eye[1], points[n, 2] - eye[2]
-        _, t = nearest(scene, among, len(among), eye[0], eye[1], eye[2], dx, dy, dz)
+        _, t = nearest(scene, among, whenever, len(among), eye[0], eye[1], eye[2], dx, dy, dz)
         seen[n] = t * dz > dz - tolerance

@@ -24,18 +24,16 @@ HALF: Final = 13
 CURVE: Final = 16
 """Patch: curvatures kx, ky in 1/m. Cylinder: growth of the radius per metre along y, 1 = open ends."""
 OUTLINE: Final = 18
-REACH: Final = 19
-"""Radius of a sphere about the centre that holds the primitive."""
-TEXTURE: Final = 20
-SCALE: Final = 21
-COLOURS: Final = 22
+TEXTURE: Final = 19
+SCALE: Final = 20
+COLOURS: Final = 21
 """Three linear sRGB colours."""
-DETAIL: Final = 31
+DETAIL: Final = 30
 """Strength of the fine mottling on top of the pattern."""
-LIGHT_MAP: Final = 32
+LIGHT_MAP: Final = 31
 """Index of the baked shadow map, or -1."""
-PATTERN_SEED: Final = 33
-SLOTS: Final = 34
+PATTERN_SEED: Final = 32
+SLOTS: Final = 33
 
 PATCH: Final = 0
 BOX: Final = 1
@@ -157,13 +155,23 @@ def _hit_cylinder(scene: Float64, n: int, ox: float, oy: float, oz: float, dx: f
 def hit(scene: Float64, n: int, ox: float, oy: float, oz: float, dx: float, dy: float, dz: float) -> float:
     """Return the ray parameter of the first hit of one primitive, or ``FAR_AWAY``."""
     px, py, pz = ox - scene[n, CENTRE], oy - scene[n, CENTRE + 1], oz - scene[n, CENTRE + 2]
+    kind = int(scene[n, KIND])
+    if kind == PATCH and scene[n, CURVE] == 0 and scene[n, CURVE + 1] == 0:
+        lz = scene[n, AXES + 6] * px + scene[n, AXES + 7] * py + scene[n, AXES + 8] * pz
+        ez = scene[n, AXES + 6] * dx + scene[n, AXES + 7] * dy + scene[n, AXES + 8] * dz
+        t = -lz / ez if abs(ez) > 1e-12 else -1.0
+        if t <= 0:
+            return FAR_AWAY
+        px, py, pz = px + t * dx, py + t * dy, pz + t * dz
+        lx = scene[n, AXES] * px + scene[n, AXES + 1] * py + scene[n, AXES + 2] * pz
+        ly = scene[n, AXES + 3] * px + scene[n, AXES + 4] * py + scene[n, AXES + 5] * pz
+        return t if _inside(scene, n, lx, ly) else FAR_AWAY
     lx = scene[n, AXES] * px + scene[n, AXES + 1] * py + scene[n, AXES + 2] * pz
     ly = scene[n, AXES + 3] * px + scene[n, AXES + 4] * py + scene[n, AXES + 5] * pz
     lz = scene[n, AXES + 6] * px + scene[n, AXES + 7] * py + scene[n, AXES + 8] * pz
     ex = scene[n, AXES] * dx + scene[n, AXES + 1] * dy + scene[n, AXES + 2] * dz
     ey = scene[n, AXES + 3] * dx + scene[n, AXES + 4] * dy + scene[n, AXES + 5] * dz
     ez = scene[n, AXES + 6] * dx + scene[n, AXES + 7] * dy + scene[n, AXES + 8] * dz
-    kind = int(scene[n, KIND])
     if kind == PATCH:
         return _hit_patch(scene, n, lx, ly, lz, ex, ey, ez)
     if kind == BOX:
@@ -219,11 +227,21 @@ def surface_point(scene: Float64, n: int, x: float, y: float, z: float) -> tuple
     return math.atan2(x, -z) * scene[n, HALF], y
 
 
-def reach(kind: int, half: Float64, curve: Float64) -> float:
-    """Return the radius of a sphere about the centre that holds a primitive."""
-    if kind == PATCH:
-        sag = 0.5 * abs(curve[0]) * half[0] ** 2 + 0.5 * abs(curve[1]) * half[1] ** 2
-        return float(np.hypot(np.hypot(half[0], half[1]), sag))
-    if kind == CYLINDER:
-        return float(np.hypot(half[0] + abs(curve[0]) * half[1], half[1]))
-    return float(np.linalg.norm(half)) if kind == BOX else float(np.max(half))
+def extents(primitives: Float64) -> Float64:
+    """Return half the size of an upright box about each primitive's centre that holds it, ``(N, 3)`` m.
+
+    Examples
+    --------
+    A ball of radius 0.1 m, whatever its axes: 0.1, 0.1, 0.1.
+    """
+    axes = np.abs(primitives[:, AXES : AXES + 9].reshape(-1, 3, 3))
+    half, kind = primitives[:, HALF : HALF + 3].copy(), primitives[:, KIND]
+    curve = np.abs(primitives[:, CURVE : CURVE + 2])
+    patch, cylinder = kind == PATCH, kind == CYLINDER
+    half[patch, 2] = 0.5 * np.sum(curve[patch] * half[patch, :2] ** 2, axis=1)
+    widest = half[cylinder, 0] + curve[cylinder, 0] * half[cylinder, 1]
+    half[cylinder, 0] = half[cylinder, 2] = widest
+    box = np.einsum("nk,nkx->nx", half, axes)
+    ball = np.sqrt(np.einsum("nk,nkx->nx", half**2, axes**2))
+    sizes: Float64 = np.where((kind == ELLIPSOID)[:, None], ball, box) + 1e-6
+    return sizes

@@ -224,7 +224,7 @@ def mug(stand: Stand, rng: np.random.Generator) -> Rows:
 
 def postcard(stand: Stand, rng: np.random.Generator) -> Rows:
     """Return a bent picture leaning backwards."""
-    w, h = 0.62 * stand.size, 0.45 * stand.size
+    w, h = 0.56 * stand.size, 0.40 * stand.size
     skies = (("#7fb0d6", "#5d7f86", "#2f4a2c"), ("#e0a878", "#8a5a6a", "#3a2a40"), ("#9cc0c8", "#7a8a5a", "#40502a"))
     surface = Surface(paint.LANDSCAPE, skies[int(rng.integers(len(skies)))], 0.1 * w, 0.15, int(rng.integers(1, 999)))
     turn = stand.turned(rng.uniform(-0.4, 0.4))
@@ -290,6 +290,6 @@ def pendant(stand: Stand, rng: np.random.Generator) -> Rows:
 
 
 Builder = Callable[[Stand, np.random.Generator], Rows]
-LOW: dict[str, Builder] = {"ball": ball, "blocks": blocks, "mug": mug, "books": books}
-MIDDLE: dict[str, Builder] = {"globe": globe, "postcard": postcard, "page": page, "books": books}
-TALL: dict[str, Builder] = {"plant": plant, "vase": vase, "lamp": lamp, "trellis": trellis}
+LOW: tuple[Builder, ...] = (ball, blocks, mug, books)
+MIDDLE: tuple[Builder, ...] = (globe, postcard, page)
+TALL: tuple[Builder, ...] = (plant, vase, lamp, trellis)

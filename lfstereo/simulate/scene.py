@@ -19,12 +19,11 @@ from lfstereo.simulate.primitives import (
     OUTLINE,
     PATCH,
     PATTERN_SEED,
-    REACH,
     RECTANGLE,
     SCALE,
     SLOTS,
     TEXTURE,
-    reach,
+    extents,
 )
 from lfstereo.simulate.shade import AMBIENT, CONTACT, FLOOR, KEY, LIGHT_SLOTS, TOWARDS_LIGHT, bake
 from lfstereo.simulate.texture import MOTTLED, PLAIN
@@ -57,6 +56,11 @@ class Scene:
     """``(LIGHT_SLOTS,)``, see ``shade``."""
     light_maps: Float32
     """``(L, S, S)`` share of the light that places of flat patches see."""
+
+    @property
+    def extents(self) -> Float64:
+        """Half the size of an upright box about each primitive, ``(N, 3)``."""
+        return extents(self.primitives)
 
     def seen_from(self, rotation: Float64, translation_m: Float64) -> Scene:
         """Return the scene in other axes: ``X_new = R X + t``."""
@@ -109,7 +113,6 @@ def primitive(
     row = np.zeros(SLOTS)
     row[KIND], row[CENTRE : CENTRE + 3], row[AXES : AXES + 9] = kind, centre, np.asarray(axes).ravel()
     row[HALF : HALF + 3], row[CURVE : CURVE + 2], row[OUTLINE] = half, curve, outline
-    row[REACH] = reach(kind, np.asarray(half), np.asarray(curve))
     row[TEXTURE], row[SCALE], row[DETAIL] = surface.texture, surface.scale_m, surface.detail
     row[COLOURS : COLOURS + 9] = np.concatenate([linear_rgb(c) for c in surface.colours])
     row[LIGHT_MAP], row[PATTERN_SEED] = -1, surface.seed
@@ -134,11 +137,11 @@ def room_light(towards: Vector, floor: tuple[float, float, float, float], contac
     return light
 
 
-def with_shadows(primitives: Float64, light: Float64, receivers: tuple[int, ...], size: int = 192) -> Scene:
+def with_shadows(primitives: Float64, light: Float64, receivers: tuple[int, ...], size: int = 128) -> Scene:
     """Return a scene whose given flat patches carry the soft shadows of everything else."""
     painted = primitives.copy()
     painted[list(receivers), LIGHT_MAP] = range(len(receivers))
-    maps = [bake(painted, light, which, size, 40, 0.16) for which in receivers]
+    maps = [bake(painted, light, which, size, 36, 0.16) for which in receivers]
     return Scene(painted, light, np.stack(maps))
 
 

@@ -17,7 +17,6 @@ from lfstereo.simulate.primitives import (
     FAR_AWAY,
     HALF,
     LIGHT_MAP,
-    REACH,
     hit,
     local_normal,
 )
@@ -39,6 +38,7 @@ LIGHT_SLOTS: Final = 14
 def nearest(
     scene: Float64,
     among: Candidates,
+    entry: Float64,
     count: int,
     ox: float,
     oy: float,
@@ -47,34 +47,52 @@ def nearest(
     dy: float,
     dz: float,
 ) -> tuple[int, float]:
-    """Return the first primitive among the candidates that a ray meets (-1: none) and the ray parameter."""
+    """Return the first primitive among the candidates that a ray meets (-1: none) and the ray parameter.
+
+    ``entry`` gives a ray parameter before which each candidate is not met, in rising order.
+    """
     best, which = FAR_AWAY, -1
-    for n in range(count):
-        t = hit(scene, among[n], ox, oy, oz, dx, dy, dz)
+    for k in range(count):
+        if entry[k] > best:
+            break
+        t = hit(scene, among[k], ox, oy, oz, dx, dy, dz)
         if 1e-6 < t < best:
-            best, which = t, among[n]
+            best, which = t, among[k]
     return which, best
 
 
 @compiled
-def candidates(scene: Float64, dx: float, dy: float, waist: float, widen: float, among: Candidates) -> int:
-    """Collect the primitives that a bundle of rays around one ray can meet.
+def candidates(
+    scene: Float64,
+    extents: Float64,
+    dx: float,
+    dy: float,
+    waist: float,
+    widen: float,
+    grain: float,
+    among: Candidates,
+    entry: Float64,
+) -> int:
+    """Collect the primitives that a bundle of rays around one ray can meet, by rising depth of their near side.
 
-    The ray is ``s (dx, dy, 1)`` in camera axes; at depth s the bundle has the radius ``|widen (s/waist - 1)|``
-    plus 0.4 % of the depth for the area of a lenslet.
+    The ray is ``s (dx, dy, 1)`` in camera axes; at depth s the bundle has the radius
+    ``|widen (s/waist - 1)| + grain s``.
     """
     count = 0
-    oblique = math.sqrt(dx * dx + dy * dy + 1.0)
     for n in range(scene.shape[0]):
-        px, py, pz = scene[n, CENTRE], scene[n, CENTRE + 1], scene[n, CENTRE + 2]
-        r = scene[n, REACH]
-        cx, cy = px - pz * dx, py - pz * dy
-        spread = max(abs(widen * ((pz - r) / waist - 1)), abs(widen * ((pz + r) / waist - 1))) + 0.004 * abs(pz)
-        # The distance across z is longer than the one to the ray, by at most 1 / cos.
-        limit = r * oblique + spread
-        if cx * cx + cy * cy <= limit * limit:
-            among[count] = n
-            count += 1
+        pz, ez = scene[n, CENTRE + 2], extents[n, 2]
+        first, last = pz - ez, pz + ez
+        spread = max(abs(widen * (first / waist - 1)), abs(widen * (last / waist - 1))) + grain * last
+        if abs(scene[n, CENTRE] - pz * dx) > extents[n, 0] + abs(dx) * ez + spread:
+            continue
+        if last <= 0 or abs(scene[n, CENTRE + 1] - pz * dy) > extents[n, 1] + abs(dy) * ez + spread:
+            continue
+        place = count
+        while place > 0 and entry[place - 1] > first:
+            entry[place], among[place] = entry[place - 1], among[place - 1]
+            place -= 1
+        entry[place], among[place] = first, n
+        count += 1
     return count
 
 
@@ -142,6 +160,7 @@ def bake(scene: Float64, light: Float64, which: int, size: int, rays: int, sprea
     half_x, half_y = scene[n, HALF], scene[n, HALF + 1]
     seen = np.empty((size, size), np.float32)
     others = np.array([n for k in range(scene.shape[0]) if k != which and int(scene[k, LIGHT_MAP]) < 0])
+    whenever = np.zeros(len(others))
     for j in numba.prange(size):
         for i in range(size):
             lx, ly = (2.0 * i / (size - 1) - 1) * half_x, (2.0 * j / (size - 1) - 1) * half_y
@@ -157,7 +176,7 @@ def bake(scene: Float64, light: Float64, which: int, size: int, rays: int, sprea
                 dx = light[0] + spread * across * math.cos(angle)
                 dy = light[1] + spread * across * math.sin(angle)
                 dz = light[2] + spread * height
-                found, _ = nearest(scene, others, len(others), x, y, z, dx, dy, dz)
+                found, _ = nearest(scene, others, whenever, len(others), x, y, z, dx, dy, dz)
                 free += found < 0
             seen[j, i] = free / rays
     return seen

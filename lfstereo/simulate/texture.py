@@ -37,6 +37,8 @@ BOOK: Final = 12
 WEAVE: Final = 13
 DOTS: Final = 14
 BOARD: Final = 15
+SPOT: Final = 16
+"""One soft spot in the middle, a Gaussian whose standard deviation is the scale: a test pattern."""
 
 Colour = tuple[float, float, float]
 
@@ -129,6 +131,8 @@ def _terrazzo(
             q = lattice_random(i + di, j + dj, 2, seed)
             size = s * (0.12 + 0.38 * lattice_random(i + di, j + dj, 3, seed))
             x, y = u - (i + di + p) * s, v - (j + dj + q) * s
+            if x * x + y * y > 1.7 * (size + 0.5 * spot) ** 2:
+                continue
             skew = 0.6 * (lattice_random(i + di, j + dj, 4, seed) - 0.5)
             r = math.sqrt((x + skew * y) ** 2 + 1.6 * y * y)
             chip = _times(b if p + q > 1 else c, 0.7 + 0.6 * lattice_random(i + di, j + dj, 5, seed))
@@ -231,6 +235,8 @@ def _flat_pattern(
         return _landscape(u, v, scene, n, a, b, c, spot, seed)
     if kind == BOARD:
         return _board(u, v, scene, n, a, b)
+    if kind == SPOT:
+        return _mix(a, b, math.exp(-(u * u + v * v) / (2 * s * s)))
     if kind == CHECKER:
         i, j = math.floor(u / s), math.floor(v / s)
         edge = min(min(u - i * s, (i + 1) * s - u), min(v - j * s, (j + 1) * s - v))
@@ -245,7 +251,7 @@ def _flat_pattern(
         p, q = math.sin(2 * math.pi * u / s), math.sin(2 * math.pi * v / s)
         fade = min(1.0, s / (2 * spot))
         return _mix(a, b, 0.5 + 0.5 * fade * (p * q + 0.4 * math.sin(0.9 * (u + v) / s)))
-    across = (v + 0.12 * s * math.sin(3 * u / s)) / s
+    across = (v + 0.1 * s * math.sin(2.2 * u / s)) / s
     place = across - math.floor(across)
     soft = max(0.04, 0.5 * spot / s)
     colour = _mix(a, b, _step(0.24 - abs(place - 0.5), soft))
@@ -267,7 +273,7 @@ def surface_colour(scene: Float64, n: int, x: float, y: float, z: float, spot: f
         colour = _mix(a, b, 2.2 * (octaves(x, y, z, s, spot, seed) - 0.5) + 0.5)
     elif kind == MARBLE:
         warp = octaves(x, y, z, s, spot, seed)
-        t = 0.5 + 0.5 * math.sin(4.0 * (x + 0.6 * y - 0.4 * z) / s + 11.0 * warp)
+        t = 0.5 + 0.5 * math.sin(4.0 * (x + 0.6 * y - 0.4 * z) / s + 8.0 * warp)
         colour = _mix(_mix(a, b, t), c, _step(t - 0.88, 0.2))
     elif kind == GLOBE:
         land = octaves(x, y, z, s, spot, seed)

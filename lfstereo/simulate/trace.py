@@ -63,6 +63,7 @@ def trace_light(
             camera.optics(),
             camera.lattice(),
             scene.primitives,
+            scene.extents,
             scene.light,
             scene.light_maps,
             samples,
@@ -168,6 +169,7 @@ def _trace_rows(
     optics: Float64,
     lattice: Float64,
     scene: Float64,
+    extents: Float64,
     light: Float64,
     light_maps: Float32,
     samples: int,
@@ -175,7 +177,7 @@ def _trace_rows(
     distance, focus, per_px, aperture, pitch = optics[3], optics[4], optics[5], optics[6], optics[9]
     for n in numba.prange(light_out.shape[0]):
         y = start + n
-        among = np.empty(scene.shape[0], np.int64)
+        among, entry = np.empty(scene.shape[0], np.int64), np.empty(scene.shape[0])
         count, last_x, last_y = 0, 1e30, 1e30
         for x in range(light_out.shape[1]):
             cx, cy = _lenslet_of(x, y, lattice)
@@ -184,7 +186,9 @@ def _trace_rows(
             if share < _DARK:
                 continue
             if cx != last_x or cy != last_y:
-                count = candidates(scene, mx / distance, my / distance, focus, aperture, among)
+                count = candidates(
+                    scene, extents, mx / distance, my / distance, focus, aperture, pitch / distance, among, entry
+                )
                 last_x, last_y = cx, cy
             red, green, blue = 0.0, 0.0, 0.0
             h0, h1 = lattice_random(x, y, 0, 77), lattice_random(x, y, 1, 77)
@@ -200,7 +204,7 @@ def _trace_rows(
                 qx, qy = _in_lenslet(u2, u3, pitch)
                 fx, fy = (mx + qx) * focus / distance, (my + qy) * focus / distance
                 dx, dy = (fx - px) / focus, (fy - py) / focus
-                which, t = nearest(scene, among, count, px, py, 0.0, dx, dy, 1.0)
+                which, t = nearest(scene, among, entry, count, px, py, 0.0, dx, dy, 1.0)
                 if which < 0:
                     continue
                 r, g, b = shade(
