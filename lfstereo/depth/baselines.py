@@ -59,7 +59,9 @@ def sgbm(
     matcher.setSpeckleRange(2)
     matched = _cropped(matcher.compute(coded_left, coded_right), left) / np.float32(_STEPS_PER_PX)
     valid = matched >= int(np.floor(d_min))
-    valid[:, -1] = False  # OpenCV leaves the last column at the lowest disparity
+    valid[:, -(options.block_px // 2 + 1) :] = (
+        False  # where blocks leave the picture OpenCV favours the lowest disparity
+    )
     return _as_map(matched, valid, left)
 
 

@@ -44,7 +44,7 @@ def test_finds_random_dots(match) -> None:
     assert scores.density > 75.0
     filled = fill_from_background(found)
     assert filled.valid.all()
-    assert np.abs(filled.disparity - truth)[:, -1].max() < 1.0, "the last column has its own disparity"
+    assert np.abs(filled.disparity - truth)[:, -4:].max() < 1.0  # px: at the right border blocks leave the picture
     assert score_disparity(filled.disparity, truth, filled.valid).bad_2 < 8.0
 
 
