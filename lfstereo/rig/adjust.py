@@ -18,7 +18,8 @@ _CLIP_SIGMAS = 3.0
 _MEDIAN_OF_NORM = 1.1774
 """Median length of a 2-D Gaussian residual in standard deviations, sqrt(2 ln 2)."""
 _MAX_STEPS = 60
-_SMALL_GAIN = 1e-8
+_SMALL_GAIN = 1e-3
+"""Of the cost in variances: a step that gains less moves no unknown by a twentieth of its standard deviation."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,6 +29,10 @@ class LensModel:
     expand: Expand
     free: Bool
     """``(n,)``"""
+    expected: Float64
+    """``(n,)`` what the parameters are without any measurement."""
+    expected_sd: Float64
+    """``(n,)`` standard deviation of that; ``inf`` = anything."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,6 +84,12 @@ class _Problem:
     @property
     def shared(self) -> int:
         return sum(int(m.free.sum()) for m in self.models) + 6 * (len(self.models) - 1)
+
+    def surprise(self, state: BundleState) -> tuple[Float64, Float64]:
+        """Return how far the free camera parameters are from what was expected, and the weights of their squares."""
+        pairs = list(zip(self.models, state.cameras, strict=True))
+        away = np.concatenate([(values - m.expected)[m.free] for m, values in pairs])
+        return away, np.concatenate([1 / m.expected_sd[m.free] ** 2 for m, _ in pairs])
 
     def columns(self, seen: Seen) -> np.ndarray[tuple[int], np.dtype[np.intp]]:
         """Return the unknowns that a shot depends on, in the order of its derivatives."""
@@ -166,7 +177,8 @@ def _sigma(problem: _Problem, state: BundleState) -> float:
 
 
 def _cost(problem: _Problem, state: BundleState, clip: float) -> float:
-    total = 0.0
+    away, weight = problem.surprise(state)
+    total = 0.5 * (clip / _CLIP_SIGMAS) ** 2 * float(weight @ away**2)
     for seen in problem.seen:
         length = np.hypot(*_residual(problem, state, seen).T)
         loss = np.where(length <= clip, 0.5 * length**2, clip * (length - 0.5 * clip))
@@ -190,10 +202,10 @@ def _descend(
             trial = _moved(problem, state, delta)
             trial_cost = _cost(problem, trial, clip)
             if trial_cost < cost:
-                gain, state, cost, damping = (cost - trial_cost) / cost, trial, trial_cost, max(damping / 10, 1e-14)
+                gain, state, cost, damping = cost - trial_cost, trial, trial_cost, max(damping / 10, 1e-14)
                 break
             damping *= 8
-        if gain < _SMALL_GAIN or cost == 0:
+        if gain < _SMALL_GAIN * (clip / _CLIP_SIGMAS) ** 2:
             return state, step + 1
     return state, max(_MAX_STEPS - done, 0)
 
@@ -201,18 +213,22 @@ def _descend(
 def _normal_equations(
     problem: _Problem, state: BundleState, clip: float, meat: Float64 | None = None
 ) -> tuple[Float64, Float64, int]:
-    """Return ``J'WJ`` and ``J'Wr``; add the squared scores of each corner of each shot to ``meat``."""
+    """Return ``J'WJ`` and ``J'Wr``, with what was expected; add the squares of each corner's scores to ``meat``."""
     size = problem.shared + 6 * problem.poses
     normal, gradient, clusters = np.zeros((size, size)), np.zeros(size), 0
+    away, weight = problem.surprise(state)
+    own = np.arange(len(away))
+    normal[own, own] += (clip / _CLIP_SIGMAS) ** 2 * weight
+    gradient[own] += (clip / _CLIP_SIGMAS) ** 2 * weight * away
     for seen in problem.seen:
         shot = seen.sightings
         residual, jacobian = _derivatives(problem, state, seen)
-        weight = shot.weight * np.minimum(1.0, clip / np.maximum(np.hypot(*residual.T), 1e-300))
-        weighted = jacobian * weight[:, None, None]
+        trust = shot.weight * np.minimum(1.0, clip / np.maximum(np.hypot(*residual.T), 1e-300))
+        weighted = jacobian * trust[:, None, None]
         columns = problem.columns(seen)
-        wide = weighted.reshape(-1, len(columns))
-        normal[np.ix_(columns, columns)] += wide.T @ jacobian.reshape(-1, len(columns))
-        gradient[columns] += wide.T @ residual.ravel()
+        # Not matmul: threads of a linear algebra library stall each other on matrices this thin.
+        normal[np.ix_(columns, columns)] += np.einsum("mac,mad->cd", weighted, jacobian)
+        gradient[columns] += np.einsum("mac,ma->c", weighted, residual)
         if meat is not None:
             scores = np.zeros((len(problem.points), len(columns)))
             np.add.at(scores, shot.corner, np.einsum("mac,ma->mc", weighted, residual))

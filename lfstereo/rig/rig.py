@@ -18,6 +18,7 @@ from lfstereo.outputs import atomic_file
 FORMAT = "lfstereo rig 1"
 Pair = tuple[float, float]
 Triple = tuple[float, float, float]
+Five = tuple[float, float, float, float, float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +47,9 @@ class PlenopticCamera:
     """Zf: depth of the plane of zero slope."""
     pupil_m_per_px: float
     """Metres on the pupil per sensor px of offset inside a micro-image."""
+    distortion: Five = (0.0, 0.0, 0.0, 0.0, 0.0)
+    """k1, k2, k3, b1, b2: how the lens bends the ideal directions ``(x - cx)/fx``; see
+    :func:`lfstereo.rig.distortion.distort`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,6 +146,7 @@ def _camera(table: dict[str, Any], where: str) -> PlenopticCamera:
     if min(width, height, fx, fy) <= 0:
         raise ConfigError(f"{where}: sensor_px and focal_px must be positive, found {table['sensor_px']} and {fx, fy}")
     cx, cy = _numbers(table, "principal_px", 2, where)
+    k1, k2, k3, b1, b2 = _numbers(table, "distortion", 5, where) if "distortion" in table else (0.0,) * 5
     return PlenopticCamera(
         serial=serial,
         sensor_px=(int(width), int(height)),
@@ -149,6 +154,7 @@ def _camera(table: dict[str, Any], where: str) -> PlenopticCamera:
         principal_px=(cx, cy),
         focus_distance_m=_positive(table, "focus_distance_m", where),
         pupil_m_per_px=_positive(table, "pupil_m_per_px", where),
+        distortion=(k1, k2, k3, b1, b2),
     )
 
 

@@ -111,7 +111,8 @@ def _adjusted(shots: Sequence[Sightings], points: Float64, width: float, progres
     centre = np.zeros(2)
     focal = start_focal_px(shots, points, centre, width)
     poses = [start_poses(shot, points, focal, centre)[0] for shot in shots]
-    vergence, pupil = start_pupil(shots, points, [pose[:2] for pose in poses], focal)
+    depths = [(points @ rotation.T + translation)[:, 2] for rotation, translation, _ in poses]
+    vergence, pupil = start_pupil(shots, depths, focal)
     start = np.zeros(13)
     start[:2] = pupil
     start[[H31, H42]] = -pupil * vergence
@@ -123,5 +124,5 @@ def _adjusted(shots: Sequence[Sightings], points: Float64, width: float, progres
         rotations=np.stack([pose[0] for pose in poses]),
         translations=np.stack([pose[1] for pose in poses]),
     )
-    model = LensModel(matrix_rays, np.ones(13, np.bool_))
+    model = LensModel(matrix_rays, np.ones(13, np.bool_), np.zeros(13), np.full(13, np.inf))
     return adjust([model], points, [Seen(0, i, shot) for i, shot in enumerate(shots)], state, progress)
