@@ -21,6 +21,10 @@ _LEAST_SIDE_PITCHES = 12
 _FIT_RADIUS_PITCHES = 0.58
 _LEAST_EXPOSED = 0.1
 """Where fewer micro-images than this share are well exposed, all are used."""
+_CENTRES_PER_ROUND = 25_000
+"""The last round measures all centres."""
+_CONVERGED_PX = 0.003
+_LEAST_CENTRES = 30
 _AGREEMENT_PITCHES = 0.05
 """A lenslet agrees with the lattice when its measured centre lies this close, in pitches."""
 
@@ -54,7 +58,7 @@ def fit_grid(white: Capture, options: GridOptions = GridOptions(), progress: Pro
             f"{white.source}: found a mean brightness of {brightness:.3f} of full scale, a white image has at least "
             f"{options.least_brightness:g}; is it a dark frame?"
         )
-    lattice, centres, residual, quality = _fit(white, options, progress)
+    lattice, centres, residual, quality = _fit(white, options, options.white_shading_per_px, progress)
     unevenness = _unevenness(white, lattice)
     if unevenness > options.largest_unevenness:
         raise GridFitError(
@@ -62,7 +66,7 @@ def fit_grid(white: Capture, options: GridOptions = GridOptions(), progress: Pro
             f"image stays below {100 * options.largest_unevenness:.0f} %; give the frame of an evenly lit white surface"
         )
     _refuse_disagreement(white.source, quality, options.least_quality, len(centres.amplitude))
-    return to_grid(lattice, _shape(white), residual, quality, "white image")
+    return to_grid(lattice, _shape(white), _nominal_pitch(white), residual, quality, "white image")
 
 
 def estimate_grid_from_photograph(
@@ -89,31 +93,45 @@ def estimate_grid_from_photograph(
     ShapeError
         If the frame is smaller than a dozen lenslets.
     """
-    lattice, centres, residual, quality = _fit(photograph, options, progress)
+    lattice, centres, residual, quality = _fit(photograph, options, options.photograph_shading_per_px, progress)
     _refuse_disagreement(photograph.source, quality, 0.5 * options.least_quality, len(centres.amplitude))
-    return to_grid(lattice, _shape(photograph), residual, quality, "photograph")
+    return to_grid(lattice, _shape(photograph), _nominal_pitch(photograph), residual, quality, "photograph")
 
 
-def _fit(capture: Capture, options: GridOptions, progress: Progress) -> tuple[Lattice, Centres, float, float]:
-    meta = capture.metadata
-    nominal = meta.lenslets.pitch_m / meta.pixel_pitch_m if meta.pixel_pitch_m > 0 else 14.0
+def _fit(
+    capture: Capture, options: GridOptions, shading_per_px: float, progress: Progress
+) -> tuple[Lattice, Centres, float, float]:
+    nominal = _nominal_pitch(capture)
     side = min(capture.mosaic.shape)
     if capture.mosaic.ndim != 2 or side < _LEAST_SIDE_PITCHES * np.clip(nominal, 6, 20):
         raise ShapeError(
             f"{capture.source}: found a frame of shape {capture.mosaic.shape}, expected (height, width) of at least "
             f"{_LEAST_SIDE_PITCHES} lenslets; give a whole raw frame"
         )
-    steps = options.passes + 2
+    steps = options.passes + 3
     flat = flatten(capture, float(np.clip(nominal, 6, 40)))
     progress(1, steps)
     lattice = lattice_from_phases(flat, coarse_frequencies(flat, capture.source))
     exposed = _well_exposed(capture, lattice.pitch)
     progress(2, steps)
     for n in range(options.passes):
-        stride = 1 if n == options.passes - 1 else 5
-        lattice, centres, residual, quality = _improve(flat, exposed, lattice, options.template_share, stride)
+        before = lattice
+        lattice = _improve(flat, exposed, lattice, options, shading_per_px, _CENTRES_PER_ROUND)[0]
         progress(3 + n, steps)
-    return lattice, centres, residual, quality
+        if _largest_move(before, lattice, flat.shape) < _CONVERGED_PX:
+            break
+    found = _improve(flat, exposed, lattice, options, shading_per_px, flat.size)
+    progress(steps, steps)
+    return found
+
+
+def _largest_move(before: Lattice, after: Lattice, shape: tuple[int, ...]) -> float:
+    """Return by how many px a lattice moved, at most, in the corners of a frame."""
+    height, width = shape
+    corners = np.array([[0, 0], [width, 0], [0, height], [width, height]], np.float64)
+    index = (corners - before.origin) @ before.reciprocal.T
+    moved = after.origin + index @ after.matrix.T - corners
+    return float(np.hypot(*moved.T).max())
 
 
 def _well_exposed(capture: Capture, pitch: float) -> Bool:
@@ -127,25 +145,29 @@ def _well_exposed(capture: Capture, pitch: float) -> Bool:
 
 
 def _improve(
-    flat: Float32, exposed: Bool, lattice: Lattice, share: float, stride: int
+    flat: Float32, exposed: Bool, lattice: Lattice, options: GridOptions, shading_per_px: float, most: int
 ) -> tuple[Lattice, Centres, float, float]:
-    """Measure every ``stride``-th centre and fit the lattice anew; also return RMS and agreement."""
+    """Measure up to ``most`` centres and fit the lattice anew; also return RMS and agreement."""
     radius = _FIT_RADIUS_PITCHES * lattice.pitch
     height, width = flat.shape
-    index = lattice.indices_inside((height, width), radius + 2)[::stride]
+    index = lattice.indices_inside((height, width), radius + 2)
     expected = lattice.origin + index @ lattice.matrix.T
     spots = np.round(expected).astype(np.int64)
     lit = exposed[spots[:, 1], spots[:, 0]]
     if lit.mean() > _LEAST_EXPOSED:
         index, expected = index[lit], expected[lit]
-    centres = measure_centres(flat, expected, mean_micro_image(flat, lattice, share=share), radius)
+    stride = max(1, len(index) // most)
+    index, expected = index[::stride], expected[::stride]
+    micro_image = mean_micro_image(flat, lattice, share=options.template_share)
+    centres = measure_centres(flat, expected, micro_image, radius, shading_per_px)
     measured = expected + centres.displacement
-    usable = np.hypot(*centres.displacement.T) < 0.35 * lattice.pitch
-    if usable.sum() < 30:
+    middle = np.array([width - 1, height - 1]) / 2
+    field = np.hypot(*(expected - middle).T) / np.hypot(*middle)
+    usable = (np.hypot(*centres.displacement.T) < 0.35 * lattice.pitch) & (field < options.trusted_field)
+    if usable.sum() < _LEAST_CENTRES:
         return lattice, centres, float("inf"), 0.0
-    fitted, residual = robust_affine(
-        index[usable], measured[usable], (1 / np.maximum(centres.misfit, 1e-3) ** 2)[usable]
-    )
+    weight = 1 / np.maximum(centres.misfit[usable], 1e-3) ** 2
+    fitted, residual = robust_affine(index[usable], measured[usable], weight)
     distance = np.hypot(*(measured - fitted.origin - index @ fitted.matrix.T).T)
     agree = distance < _AGREEMENT_PITCHES * lattice.pitch
     return fitted, centres, residual, float(agree.mean())
@@ -209,6 +231,10 @@ def _refuse_disagreement(where: str, quality: float, least: float, count: int) -
             f"{where}: only {100 * quality:.0f} % of {count} lenslets agree with one regular grid, expected at least "
             f"{100 * least:.0f} %; the frame is damaged, dark or not from a lenslet camera"
         )
+
+
+def _nominal_pitch(capture: Capture) -> float:
+    return capture.metadata.lenslets.pitch_m / capture.metadata.pixel_pitch_m
 
 
 def _shape(capture: Capture) -> tuple[int, int]:

@@ -10,6 +10,9 @@ from lfstereo.arrays import Float64
 from lfstereo.lenslet.grid import LensletGrid
 
 
+_SAME_PITCH = 0.02
+
+
 @dataclass(frozen=True, slots=True)
 class Lattice:
     """Points ``origin + i * row + j * diagonal`` for all whole ``i`` and ``j``, in px of the raw sensor."""
@@ -57,11 +60,19 @@ class Lattice:
         return np.asarray(index[inside], np.float64)
 
 
-def to_grid(lattice: Lattice, shape: tuple[int, int], residual_px: float, quality: float, source: str) -> LensletGrid:
+def to_grid(
+    lattice: Lattice,
+    shape: tuple[int, int],
+    nominal_pitch_px: float,
+    residual_px: float,
+    quality: float,
+    source: str,
+) -> LensletGrid:
     """Choose the rows and columns that fill a sensor and number them from its top-left corner.
 
-    The counts depend on the sensor and the pitch alone, so two cameras of one model give light fields of one
-    size: 434 x 541 lenslets for an Illum, centred on the sensor to within half a lenslet.
+    The counts follow from the sensor and the camera's nominal pitch, so all cameras of one model at every zoom
+    give light fields of one size: 434 x 541 lenslets for an Illum, centred on the sensor to within half a lenslet.
+    The outermost lenslets may lie partly beyond its border.
 
     Parameters
     ----------
@@ -69,6 +80,8 @@ def to_grid(lattice: Lattice, shape: tuple[int, int], residual_px: float, qualit
         The fitted lattice.
     shape
         (height, width) of the sensor.
+    nominal_pitch_px
+        Pitch that the camera's metadata give; not used where it is more than 2 % off the fitted one.
     residual_px, quality, source
         Passed on to the grid.
     """
@@ -77,8 +90,10 @@ def to_grid(lattice: Lattice, shape: tuple[int, int], residual_px: float, qualit
     step_v = lattice.diagonal - 0.5 * lattice.row
     along = step_u / np.hypot(*step_u)
     row_distance = float(along[0] * step_v[1] - along[1] * step_v[0])
-    rows = round(height / row_distance)
-    columns = round(width / float(np.hypot(*step_u)))
+    pitch = float(np.hypot(*step_u))
+    known = abs(nominal_pitch_px / lattice.pitch - 1) < _SAME_PITCH
+    rows = round(height / (nominal_pitch_px * np.sqrt(3) / 2 if known else row_distance))
+    columns = round(width / (nominal_pitch_px if known else pitch))
     middle = np.array([(width - 1) / 2, (height - 1) / 2])
     j_first = round(float((lattice.reciprocal @ (middle - lattice.origin))[1]) - (rows - 1) / 2)
     left = lattice.origin + j_first * lattice.diagonal

@@ -11,8 +11,11 @@ from lfstereo.options import option
 class GridOptions:
     """How the lenslet grid is fitted and when it is refused."""
 
-    passes: int = option(4, "rounds of measuring centres and refitting the lattice")
-    template_share: float = option(0.5, "part of the frame's width and height that gives the mean micro-image")
+    passes: int = option(10, "rounds of measuring centres and refitting the lattice, at most")
+    template_share: float = option(0.3, "part of the frame's width and height that gives the mean micro-image")
+    white_shading_per_px: float = option(0.05, "allowed shading across the micro-images of a white image", "1/px")
+    photograph_shading_per_px: float = option(0.01, "allowed shading across those of a photograph", "1/px")
+    trusted_field: float = option(0.45, "field, of the half diagonal, whose micro-images the lens does not cut")
     least_quality: float = option(0.5, "smallest share of lenslets that must agree with the lattice")
     largest_unevenness: float = option(0.12, "largest median brightness change between neighbours in a white image")
     least_brightness: float = option(0.03, "smallest mean brightness of a white image, white level = 1")

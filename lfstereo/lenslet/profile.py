@@ -12,8 +12,9 @@ from lfstereo.arrays import Float32, Float64
 from lfstereo.lenslet.lattice import Lattice
 
 BINS_PER_PIXEL = 4
-_BORDER_WIDTH_PX = 0.5
-"""Half-width of the zone in which the light of two neighbouring lenslets mixes."""
+_BORDER_WIDTH_PX = 0.16
+"""Scale of the zone in which the light of two neighbouring lenslets mixes: two discs that end half a px before
+their border, blurred by half a px, have shares that follow a logistic curve of this width."""
 
 
 @dataclass(frozen=True, slots=True)
