@@ -9,7 +9,6 @@ import numpy as np
 from lfstereo.arrays import Float64
 from lfstereo.lenslet.grid import LensletGrid
 
-
 _SAME_PITCH = 0.02
 
 
