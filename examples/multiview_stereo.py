@@ -19,11 +19,11 @@ import numpy as np
 from lfstereo.depth.baselines import fill_from_background, sgbm, sgbm_wls
 from lfstereo.depth.colormap import DisparityScale, colour_disparity
 from lfstereo.depth.metrics import score_disparity
-from lfstereo.depth.pictures import srgb8, write_png
+from lfstereo.depth.pictures import write_png
 from lfstereo.focus.aperture import RefocusOptions
 from lfstereo.focus.refocus import render_stack, slice_disparities
 from lfstereo.focus.stack import FocalStack
-from lfstereo.lightfield.encoding import srgb_to_linear
+from lfstereo.lightfield.encoding import srgb8, srgb_to_linear
 from lfstereo.lightfield.field import LightField
 
 STEPS_BETWEEN_CENTRES = 4

@@ -11,9 +11,10 @@ import cv2
 import numpy as np
 
 from lfstereo.depth.colormap import DisparityScale, picture_disparity
-from lfstereo.depth.pictures import srgb8, write_png
+from lfstereo.depth.pictures import write_png
 from lfstereo.focus.measures import depth_from_focus
 from lfstereo.focus.refocus import render_stack, slice_disparities
+from lfstereo.lightfield.encoding import srgb8
 from lfstereo.lightfield.field import LightField
 
 VIEWS, ROWS, COLUMNS = 9, 160, 240

@@ -14,17 +14,18 @@ import tifffile
 
 from lfstereo import __version__
 from lfstereo.arrays import Bool, Float32, UInt8
-from lfstereo.depth.baselines import fill_from_background, sgbm_wls
+from lfstereo.depth.baselines import fill_from_background, sgbm, sgbm_wls
 from lfstereo.depth.colormap import DisparityScale, colour_disparity, picture_disparity
 from lfstereo.depth.metrics import score_disparity
 from lfstereo.depth.pfm import read_pfm, write_pfm
-from lfstereo.depth.pictures import srgb8, srgb16, write_png
+from lfstereo.depth.pictures import write_png
 from lfstereo.depth.ply import write_ply
 from lfstereo.depth.png16 import write_disparity_png
 from lfstereo.depth.points import points_from_depth
 from lfstereo.depth.triangulate import DepthMap, triangulate
 from lfstereo.errors import AssetError, ShapeError
 from lfstereo.focus.stack import FocalStack
+from lfstereo.lightfield.encoding import srgb8, srgb16
 from lfstereo.options import to_toml, toml_value
 from lfstereo.outputs import atomic_folder
 from lfstereo.pipeline import PairResult, RunOptions
@@ -103,9 +104,9 @@ def write_results(
 
 
 def truth_errors(result: PairResult, truth_folder: Path) -> dict[str, dict[str, float]]:
-    """Compare with a true disparity map, beside SGBM + WLS (holes filled) on the rectified centre views.
+    """Compare with a true disparity map, beside SGBM and SGBM + WLS (holes filled) on the rectified centre views.
 
-    Both are judged at every pixel whose truth is known inside the common field of view.
+    All are judged at every pixel whose truth is known inside the common field of view.
 
     Raises
     ------
@@ -123,10 +124,13 @@ def truth_errors(result: PairResult, truth_folder: Path) -> dict[str, dict[str, 
             f"{path}: {truth.shape}, but the result has {result.map.disparity.shape}; give the truth of this rig"
         )
     judged = known & result.map.valid
-    matched = sgbm_wls(result.left.centre_view, result.right.centre_view, result.geometry.disparity_max_px)
+    centres = result.left.centre_view, result.right.centre_view
+    candidates = {"lfstereo": result.map}
+    for name, match in (("SGBM", sgbm), ("SGBM + WLS", sgbm_wls)):
+        candidates[name] = fill_from_background(match(*centres, result.geometry.disparity_max_px))
     depth_true = _depth(result, truth, judged)
     errors = {}
-    for name, found in (("lfstereo", result.map), ("SGBM + WLS", fill_from_background(matched))):
+    for name, found in candidates.items():
         scores = score_disparity(found.disparity, truth, judged)
         depth = _depth(result, found.disparity, judged)
         both = depth.valid & depth_true.valid

@@ -13,7 +13,7 @@ import lfstereo
 
 PACKAGE = Path(lfstereo.__file__).parent
 LAYERS = [
-    ["__init__", "errors", "conventions", "arrays", "options", "assets", "outputs", "progress"],
+    ["errors", "conventions", "arrays", "options", "assets", "outputs", "progress"],
     ["container"],
     ["lenslet"],
     ["develop"],
@@ -25,7 +25,7 @@ LAYERS = [
     ["network"],
     ["training"],
     ["pipeline", "results", "batch", "viewer"],
-    ["cli", "__main__"],
+    ["cli", "__main__", "__init__"],
 ]
 RANK = {name: rank for rank, names in enumerate(LAYERS) for name in names}
 TORCH_PACKAGES = {"network", "training"}

@@ -9,8 +9,8 @@ import numpy as np
 
 from lfstereo.arrays import Bool, Disparity, Float32, Rgb, UInt8
 from lfstereo.depth.disparity import DisparityMap
-from lfstereo.depth.pictures import srgb8
 from lfstereo.errors import ConfigError, ShapeError
+from lfstereo.lightfield.encoding import srgb8
 from lfstereo.options import option
 
 _STEPS_PER_PX = 16.0

@@ -8,9 +8,9 @@ import cv2
 import numpy as np
 
 from lfstereo.arrays import Bool, Float32, Rgb, UInt8, check_shape
-from lfstereo.depth.pictures import srgb8
 from lfstereo.depth.triangulate import DepthMap
 from lfstereo.errors import ConfigError, ShapeError
+from lfstereo.lightfield.encoding import srgb8
 from lfstereo.options import option
 
 

@@ -28,21 +28,22 @@ def from_codes(codes: UInt16, peak: float) -> Float32:
     return np.multiply(root, root, out=root)
 
 
-def linear_to_srgb(linear: Float32) -> UInt8:
-    """Encode linear light for a screen: 8-bit sRGB, clipped to 0..1.
-
-    References
-    ----------
-    IEC 61966-2-1:1999, transfer function.
+def srgb8(linear: Float32) -> UInt8:
+    """Return 8-bit sRGB of linear RGB, 1.0 = 255; values outside 0..1 are clipped.
 
     Examples
     --------
-    >>> linear_to_srgb(np.array([0.0, 0.2140, 1.0], np.float32)).tolist()
-    [0, 127, 255]
+    >>> srgb8(np.array([0.0, 0.18, 1.0, 2.0], np.float32)).tolist()
+    [0, 118, 255, 255]
     """
-    clipped = np.clip(linear, 0, 1)
-    coded = np.where(clipped <= 0.0031308, 12.92 * clipped, 1.055 * np.power(clipped, 1 / 2.4) - 0.055)
-    return np.asarray(255 * coded + 0.5, np.uint8)
+    coded: UInt8 = np.rint(_encoded(linear) * np.float32(255)).astype(np.uint8)
+    return coded
+
+
+def srgb16(linear: Float32) -> UInt16:
+    """Return 16-bit sRGB of linear RGB, 1.0 = 65535; values outside 0..1 are clipped."""
+    coded: UInt16 = np.rint(_encoded(linear) * np.float32(65535)).astype(np.uint16)
+    return coded
 
 
 def srgb_to_linear(coded: UInt8 | UInt16) -> Float32:
@@ -61,3 +62,11 @@ def srgb_to_linear(coded: UInt8 | UInt16) -> Float32:
     ramp = np.arange(levels + 1) / levels
     table = np.where(ramp <= 0.04045, ramp / 12.92, ((ramp + 0.055) / 1.055) ** 2.4).astype(np.float32)
     return np.asarray(table[coded], np.float32)
+
+
+def _encoded(linear: Float32) -> Float32:
+    """IEC 61966-2-1 (1999), sRGB transfer curve."""
+    clipped = np.clip(linear, 0.0, 1.0).astype(np.float32)
+    bent = np.float32(1.055) * np.power(clipped, np.float32(1 / 2.4)) - np.float32(0.055)
+    encoded: Float32 = np.where(clipped <= 0.0031308, np.float32(12.92) * clipped, bent)
+    return encoded

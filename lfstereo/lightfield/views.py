@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 
 from lfstereo.arrays import Float32, Rgb, UInt8
-from lfstereo.lightfield.encoding import linear_to_srgb
+from lfstereo.lightfield.encoding import srgb8
 from lfstereo.lightfield.field import LightField
 
 _GAP = 4
@@ -51,7 +51,7 @@ def montage(light_field: LightField, raw_crop: UInt8 | None = None) -> UInt8:
     gain = np.float32(display_gain(light_field))
     rows, columns = light_field.views.shape[:2]
     height, width = light_field.views.shape[2:4]
-    centre = linear_to_srgb(light_field.views[light_field.centre] * gain)
+    centre = srgb8(light_field.views[light_field.centre] * gain)
     t_picks, s_picks = ([round(n * f) for f in (0.25, 0.5, 0.75)] for n in (rows - 1, columns - 1))
     small = (max(width // 3, 1), max(height // 3, 1))
     nine = _stack(
@@ -65,11 +65,11 @@ def montage(light_field: LightField, raw_crop: UInt8 | None = None) -> UInt8:
 
 
 def _epi(light_field: LightField, row: int, gain: np.float32) -> UInt8:
-    return np.repeat(linear_to_srgb(horizontal_epi(light_field, row) * gain), _EPI_ZOOM, axis=0)
+    return np.repeat(srgb8(horizontal_epi(light_field, row) * gain), _EPI_ZOOM, axis=0)
 
 
 def _shrunk(view: Float32, size: tuple[int, int]) -> UInt8:
-    return linear_to_srgb(np.asarray(cv2.resize(view, size, interpolation=cv2.INTER_AREA), np.float32))
+    return srgb8(np.asarray(cv2.resize(view, size, interpolation=cv2.INTER_AREA), np.float32))
 
 
 def _stack(pictures: list[UInt8], axis: int) -> UInt8:

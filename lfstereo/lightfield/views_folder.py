@@ -11,7 +11,7 @@ import numpy as np
 
 from lfstereo.arrays import UInt8, UInt16
 from lfstereo.errors import ContainerError, ShapeError
-from lfstereo.lightfield.encoding import linear_to_srgb, srgb_to_linear
+from lfstereo.lightfield.encoding import srgb8, srgb_to_linear
 from lfstereo.lightfield.field import LightField
 from lfstereo.outputs import atomic_folder
 from lfstereo.progress import Progress, silent
@@ -71,7 +71,7 @@ def write_views_folder(folder: Path, light_field: LightField, force: bool = Fals
     with atomic_folder(folder, force) as scratch:
         for t in range(rows):
             for s in range(columns):
-                picture = linear_to_srgb(light_field.views[t, s])
+                picture = srgb8(light_field.views[t, s])
                 if not cv2.imwrite(str(scratch / f"view_{t:02d}_{s:02d}.png"), picture[..., ::-1]):
                     raise OSError(f"{scratch}: a view could not be written")
                 progress(t * columns + s + 1, rows * columns)

@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 
 from lfstereo.depth.pfm import read_pfm, write_pfm
-from lfstereo.depth.pictures import srgb8, srgb16, write_png
+from lfstereo.depth.pictures import write_png
 from lfstereo.depth.ply import read_ply, write_ply
 from lfstereo.depth.png16 import read_disparity_png, write_disparity_png
 from lfstereo.depth.points import PointCloud
 from lfstereo.errors import InputError, OutputError, ShapeError
+from lfstereo.lightfield.encoding import srgb8, srgb16
 
 PIXELS = np.float32([[1.5, -2.0, 3.25], [0.0, 100.0, 1e-3]])
 
