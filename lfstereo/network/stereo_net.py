@@ -6,10 +6,10 @@ more training than an hour of a processor gives.
 
 ``fusion = "correlation"`` deviates on purpose: the stem runs on each image by itself (siamese) down to a quarter of the
 resolution, a group-wise correlation over 0 to 104 px replaces the concatenation, and the same two hourglasses (depth 4,
-which reaches the same 1/64 of the resolution) work on that volume together with the left features. The disparity
-is the expected bin; a small refinement at half resolution brings back the edges of the left image. Half of the volume
-is not learned at all: normalised cross-correlation of the images themselves, which knows what matching means before the
-first step and carries over to pictures unlike the training scenes.
+which reaches the same 1/64 of the resolution) work on that volume together with the left features. The disparity is
+the expected bin around the most likely one; a small refinement at half resolution brings back the edges of the left
+image. Half of the volume is not learned at all: normalised cross-correlation of the images themselves, which knows what
+matching means before the first step and carries over to pictures unlike the training scenes.
 
 References
 ----------
@@ -35,6 +35,7 @@ from lfstereo.network.volume import (
     group_correlation,
     likeness,
     likeness_volume,
+    mode_mean,
     soft_argmax,
     warp_right,
 )
@@ -211,6 +212,7 @@ class _Correlated(nn.Module):
         volume = torch.cat((learned, likeness_volume(images[:batch], images[batch:], BINS, DILATIONS)), dim=1)
         logits, context = self.aggregate(volume, quarter[:batch])
         coarse = [soft_argmax(scores, self.bin_values) for scores in logits]
-        final = self.refine(coarse[-1], context, half[:batch], half[batch:], images)
+        sharpest = mode_mean(logits[-1], self.bin_values)
+        final = self.refine(sharpest, context, half[:batch], half[batch:], images)
         full = [F.interpolate(m, scale_factor=4, mode="bilinear", align_corners=False) for m in coarse]
         return Prediction((*full, final), tuple(logits))

@@ -148,6 +148,39 @@ def soft_argmax(logits: Tensor, values: Tensor) -> Tensor:
     return (F.softmax(logits, dim=1) * values.view(1, -1, 1, 1)).sum(1, keepdim=True)
 
 
+def mode_mean(logits: Tensor, values: Tensor, reach: int = 2) -> Tensor:
+    """Return the expected value over the bins near the most likely one, ``(B, 1, h, w)``.
+
+    At the edge of an object two disparities are likely; the mean over all bins would lie between, where nothing is.
+
+    Parameters
+    ----------
+    logits
+        ``(B, bins, h, w)``.
+    values
+        ``(bins,)``.
+    reach
+        Bins taken on either side of the most likely one (after a mean over 3 bins).
+
+    References
+    ----------
+    Tulyakov, Ivanov, Fleuret, "Practical deep stereo" (2018), section 3.3: the sub-pixel MAP estimate.
+
+    Examples
+    --------
+    >>> logits = torch.tensor([2.0, 2.0, -9.0, -9.0, -9.0, 1.5]).view(1, 6, 1, 1)
+    >>> round(float(mode_mean(logits, torch.arange(6.0), reach=1)), 3)
+    0.5
+    """
+    share = F.softmax(logits, dim=1)
+    with torch.no_grad():
+        smooth = share + F.pad(share[:, 1:], (0, 0, 0, 0, 0, 1)) + F.pad(share[:, :-1], (0, 0, 0, 0, 1, 0))
+        likeliest = smooth.argmax(1, keepdim=True)
+        near = (torch.arange(len(values), device=logits.device).view(1, -1, 1, 1) - likeliest).abs() <= reach
+    share = share * near
+    return (share * values.view(1, -1, 1, 1)).sum(1, keepdim=True) / share.sum(1, keepdim=True)
+
+
 def warp_right(right: Tensor, disparity_px: Tensor) -> Tensor:
     """Fetch ``right`` at ``x - d`` for every left pixel.
 
