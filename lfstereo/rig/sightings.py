@@ -57,3 +57,30 @@ def usable(shot: Sightings, least: int = 8) -> bool:
     _, place = shot.centre_view()
     spread: Bool = np.linalg.svd(place - place.mean(axis=0), compute_uv=False) > 1e-3 * (1 + np.ptp(place))
     return len(place) >= least and bool(spread.all())
+
+
+def merge_views(shot: Sightings, blocks: int) -> Sightings:
+    """Average each corner's places over blocks of neighbouring views.
+
+    Within a block the place is a straight function of the view's position, so that the weighted means of both
+    still belong together; a rig is found from the means as well as from all views, in a fraction of the time.
+
+    Parameters
+    ----------
+    blocks
+        Number of blocks along both directions of the pupil; odd, so that one is central.
+    """
+    reach = max(float(np.abs(shot.offset).max(initial=0.0)), 1e-9) * (1 + 1e-9)
+    column, row = np.floor((shot.offset / reach + 1) / 2 * blocks).astype(np.intp).T
+    key, group = np.unique((shot.corner * blocks + row) * blocks + column, return_inverse=True)
+    total: Float64 = np.bincount(group, shot.weight).astype(np.float64)
+    seen = total > 0
+
+    def mean(values: Float64) -> Float64:
+        sums = np.stack([np.bincount(group, shot.weight * v) for v in values.T], axis=1)
+        means: Float64 = sums[seen] / total[seen, None]
+        return means
+
+    return Sightings(
+        shot.source, shot.serial, (key // blocks**2)[seen], mean(shot.offset), mean(shot.place), total[seen]
+    )
