@@ -10,11 +10,12 @@ import cv2
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from lfstereo.arrays import Bool, Float64
+from lfstereo.arrays import Bool, Float32, Float64
 from lfstereo.conventions import DISPARITY_RANGE_PX
 from lfstereo.errors import AssetError, RigError, ShapeError
 from lfstereo.lightfield.field import LightField, ViewSampling
 from lfstereo.progress import Progress, silent
+from lfstereo.rig.distortion import distort
 from lfstereo.rig.rig import PlenopticCamera, StereoRig
 
 Side = Literal["left", "right"]
@@ -130,7 +131,8 @@ def rectify(
 ) -> LightField:
     """Resample one light field of the pair to its rectified camera.
 
-    Every view is a pinhole at its pupil point, so it maps by one homography; the part of the pupil offset that
+    Every view is a pinhole at its pupil point, so it maps by one homography, and by the lens's distortion where the
+    rig has any; the part of the pupil offset that
     the turn moves out of the plane is exact at ``geometry.reference_m`` and below 0.1 px elsewhere.
 
     Parameters
@@ -161,14 +163,17 @@ def rectify(
     full = np.full(light_field.views.shape[2:4], 255, np.uint8)
     for index in range(t_count * s_count):
         t, s = divmod(index, s_count)
-        source = view_homography(light_field, camera, geometry, side, t, s)
-        flags = cv2.INTER_CUBIC | cv2.WARP_INVERSE_MAP
         view = light_field.views[t, s]
-        views[t, s] = cv2.warpPerspective(view, source, (columns, rows), flags=flags, borderMode=cv2.BORDER_REPLICATE)
         confidence = full if light_field.weight is None else light_field.weight[t, s]
-        weight[t, s] = cv2.warpPerspective(
-            confidence, source, (columns, rows), flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
-        )
+        if any(camera.distortion[:3]):
+            x, y = view_map(light_field, camera, geometry, side, t, s)
+            views[t, s] = cv2.remap(view, x, y, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
+            weight[t, s] = cv2.remap(confidence, x, y, cv2.INTER_LINEAR)
+        else:
+            source, size = view_homography(light_field, camera, geometry, side, t, s), geometry.size[::-1]
+            cubic, linear = (n | cv2.WARP_INVERSE_MAP for n in (cv2.INTER_CUBIC, cv2.INTER_LINEAR))
+            views[t, s] = cv2.warpPerspective(view, source, size, flags=cubic, borderMode=cv2.BORDER_REPLICATE)
+            weight[t, s] = cv2.warpPerspective(confidence, source, size, flags=linear)
         progress(index + 1, t_count * s_count)
     np.maximum(views, 0.0, out=views)
     return LightField(views=views, weight=weight, sampling=None, serial=light_field.serial, source=light_field.source)
@@ -182,10 +187,42 @@ def view_baseline_m(light_field: LightField, camera: PlenopticCamera) -> float:
 def view_homography(
     light_field: LightField, camera: PlenopticCamera, geometry: RectifiedGeometry, side: Side, t: int, s: int
 ) -> Float64:
-    """Return the ``(3, 3)`` map from rectified px to px of decoded view ``(t, s)``."""
+    """Return the ``(3, 3)`` map from rectified px to px of decoded view ``(t, s)``, of a lens without distortion."""
+    pupil = _pupil_point(light_field, camera, t, s)
+    homography: Float64 = (
+        _view_from_sensor(light_field)
+        @ _sensor_from_direction(camera, pupil)
+        @ _direction_from_rectified(geometry, side, pupil)
+    )
+    homography /= homography[2, 2]
+    return homography
+
+
+def view_map(
+    light_field: LightField, camera: PlenopticCamera, geometry: RectifiedGeometry, side: Side, t: int, s: int
+) -> tuple[Float32, Float32]:
+    """Return where in decoded view ``(t, s)`` each rectified px lies: x and y, ``(V, U)`` px; with distortion."""
+    pupil = _pupil_point(light_field, camera, t, s)
+    rows, columns = geometry.size
+    row, column = np.mgrid[:rows, :columns].astype(np.float64)
+    m = _direction_from_rectified(geometry, side, pupil)
+    depth = m[2, 0] * column + m[2, 1] * row + m[2, 2]
+    ideal = [(m[k, 0] * column + m[k, 1] * row + m[k, 2]) / depth for k in (0, 1)]
+    bent = distort(ideal[0], ideal[1], np.asarray(camera.distortion))
+    m = _view_from_sensor(light_field) @ _sensor_from_direction(camera, pupil)
+    x, y = (m[k, 0] * bent.x + m[k, 1] * bent.y + m[k, 2] for k in (0, 1))
+    return x.astype(np.float32), y.astype(np.float32)
+
+
+def _pupil_point(light_field: LightField, camera: PlenopticCamera, t: int, s: int) -> Float64:
+    """Return the pupil point of a view in camera axes, ``(3,)`` m."""
     t0, s0 = light_field.centre
     step = view_baseline_m(light_field, camera)
-    pupil = np.array([(s - s0) * step, (t - t0) * step, 0.0])
+    return np.array([(s - s0) * step, (t - t0) * step, 0.0])
+
+
+def _direction_from_rectified(geometry: RectifiedGeometry, side: Side, pupil: Float64) -> Float64:
+    """Return the ``(3, 3)`` map from rectified px to the ideal direction ``(X - pupil)/Z`` from a pupil point."""
     target = geometry.camera(side)
     f, z0, zr = geometry.focal_px, geometry.zero_slope_m, geometry.reference_m
     inverse_f = 1 / f
@@ -197,24 +234,26 @@ def view_homography(
             [0, 0, 1],
         ]
     )
+    camera_from_rectified = target.rectified_from_camera.T
+    # X_camera - pupil, linear in the homogeneous plane point because its z is the constant zr.
+    shift = np.zeros((3, 3))
+    shift[:, 2] = -pupil / zr
+    in_camera = camera_from_rectified @ plane_from_px
+    direction: Float64 = in_camera + shift @ plane_from_px
+    return direction
+
+
+def _sensor_from_direction(camera: PlenopticCamera, pupil: Float64) -> Float64:
+    """Return the ``(3, 3)`` map from bent direction to sensor px of the lattice, as seen from a pupil point."""
     fx, fy = camera.focal_px
     zf = camera.focus_distance_m
-    # Camera axes -> sensor px of the lattice, as seen from the pupil point.
-    projection = np.array(
+    return np.array(
         [
             [fx, 0, camera.principal_px[0] + fx * pupil[0] / zf],
             [0, fy, camera.principal_px[1] + fy * pupil[1] / zf],
             [0, 0, 1],
         ]
     )
-    camera_from_rectified = target.rectified_from_camera.T
-    # X_camera - pupil, linear in the homogeneous plane point because its z is the constant zr.
-    shift = np.zeros((3, 3))
-    shift[:, 2] = -pupil / zr
-    in_camera = camera_from_rectified @ plane_from_px
-    homography: Float64 = _view_from_sensor(light_field) @ projection @ (in_camera + shift @ plane_from_px)
-    homography /= homography[2, 2]
-    return homography
 
 
 def field_of_view(light_field_shape: tuple[int, int], homography: Float64, size: tuple[int, int]) -> Bool:
