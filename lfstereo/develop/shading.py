@@ -40,7 +40,8 @@ def shading_from_white_image(white: Capture) -> Float32:
         for x in (0, 1):
             plane = white.mosaic[y::2, x::2].astype(np.float32)
             plane -= np.float32(black[y][x])
-            full = float(np.percentile(plane[::_SAMPLE_STRIDE, ::_SAMPLE_STRIDE], _FULL_LIGHT_PERCENTILE))
+            smooth = cv2.blur(plane, (3, 3))[::_SAMPLE_STRIDE, ::_SAMPLE_STRIDE]
+            full = float(np.percentile(smooth, _FULL_LIGHT_PERCENTILE))
             shading[y::2, x::2] = plane / np.float32(max(full, 1.0))
     return np.maximum(shading, 0, out=shading)
 

@@ -43,7 +43,7 @@ def decode(
 
     Returns
     -------
-    The light field: ``(15, 15, 434, 625, 3)`` for an Illum, about ``(9, 9, 381, 382, 3)`` for a first-generation
+    The light field: ``(15, 15, 434, 625, 3)`` for an Illum, about ``(9, 9, 382, 382, 3)`` for a first-generation
     camera. Values are linear RGB, not below 0 and not clipped above 1; views beyond the micro-images' radius are
     black with weight 0.
 
