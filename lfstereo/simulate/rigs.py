@@ -47,7 +47,7 @@ def build_rig(options: SimulateOptions) -> SimulatedRig:
         translation_m=_triple(left_centre_from_right),
         near_m=options.near_m,
         far_m=options.far_m,
-        pixel_px=LENSLET_PITCH_M / PIXEL_PITCH_M * left.magnification * math.sqrt(3) / 2,
+        pixel_px=LENSLET_PITCH_M / PIXEL_PITCH_M * math.sqrt(3) / 2,
     )
     left_from_bar = np.column_stack([turns[0], -turns[0] @ centres[0]])
     return SimulatedRig(left, right, stereo, left_from_bar)
