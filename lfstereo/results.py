@@ -13,7 +13,7 @@ import numpy as np
 import tifffile
 
 from lfstereo import __version__
-from lfstereo.arrays import Bool, Float32, UInt8
+from lfstereo.arrays import Bool, Disparity, Float32, UInt8
 from lfstereo.depth.baselines import fill_from_background, sgbm, sgbm_wls
 from lfstereo.depth.colormap import DisparityScale, colour_disparity, picture_disparity
 from lfstereo.depth.metrics import score_disparity
@@ -42,8 +42,16 @@ class Inputs:
     left: Path
     right: Path
     rig: Path
-    whites: Path | None
-    truth: Path | None
+
+
+@dataclass(frozen=True, slots=True)
+class DisparityTruth:
+    """A true disparity map."""
+
+    disparity: Disparity
+    """``(V, U)`` px of the rectified left centre view."""
+    known: Bool
+    """``(V, U)``."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,7 +82,13 @@ class Report:
 
 
 def write_results(
-    folder: Path, result: PairResult, inputs: Inputs, options: RunOptions, clock: StageClock, force: bool
+    folder: Path,
+    result: PairResult,
+    inputs: Inputs,
+    options: RunOptions,
+    clock: StageClock,
+    truth: DisparityTruth | None = None,
+    force: bool = False,
 ) -> Report:
     """Write the result folder, whole or not at all.
 
@@ -87,11 +101,9 @@ def write_results(
     ------
     OutputError
         If the folder exists and ``force`` is not set, or it cannot be written.
-    InputError
-        If the truth to compare with cannot be read or has another size.
     """
     depth = _depth(result, result.map.disparity, result.map.valid)
-    errors = truth_errors(result, inputs.truth) if inputs.truth else {}
+    errors = truth_errors(result, truth) if truth else {}
     with atomic_folder(folder, force) as out:
         with clock.stage("write results"):
             points = _write_maps(out, result, depth)
@@ -103,35 +115,46 @@ def write_results(
     return report
 
 
-def truth_errors(result: PairResult, truth_folder: Path) -> dict[str, dict[str, float]]:
-    """Compare with a true disparity map, beside SGBM and SGBM + WLS (holes filled) on the rectified centre views.
+def read_truth(folder: Path, size: tuple[int, int]) -> DisparityTruth:
+    """Read the true disparity map that a simulation wrote.
 
-    All are judged at every pixel whose truth is known inside the common field of view.
+    Parameters
+    ----------
+    folder
+        The ``truth`` folder of the simulation.
+    size
+        (V, U) of the rectified views.
 
     Raises
     ------
     AssetError
-        If ``truth_folder`` holds no ``disparity.pfm``.
+        If the folder holds no ``disparity.pfm``.
     ShapeError
-        If the truth has another size than the result.
+        If the truth has another size.
     """
-    path = truth_folder / "disparity.pfm"
+    path = folder / "disparity.pfm"
     if not path.is_file():
-        raise AssetError(f"{truth_folder}: holds no disparity.pfm; give the 'truth' folder of a simulation")
-    truth, known = read_pfm(path)
-    if truth.shape != result.map.disparity.shape:
-        raise ShapeError(
-            f"{path}: {truth.shape}, but the result has {result.map.disparity.shape}; give the truth of this rig"
-        )
-    judged = known & result.map.valid
+        raise AssetError(f"{folder}: holds no disparity.pfm; give the 'truth' folder of a simulation")
+    disparity, known = read_pfm(path)
+    if disparity.shape != size:
+        raise ShapeError(f"{path}: {disparity.shape}, but this rig's views have {size}; give the truth of this rig")
+    return DisparityTruth(disparity, known)
+
+
+def truth_errors(result: PairResult, truth: DisparityTruth) -> dict[str, dict[str, float]]:
+    """Compare with a true disparity map, beside SGBM and SGBM + WLS (holes filled) on the rectified centre views.
+
+    All are judged at every pixel whose truth is known inside the common field of view.
+    """
+    judged = truth.known & result.map.valid
     centres = result.left.centre_view, result.right.centre_view
     candidates = {"lfstereo": result.map}
     for name, match in (("SGBM", sgbm), ("SGBM + WLS", sgbm_wls)):
         candidates[name] = fill_from_background(match(*centres, result.geometry.disparity_max_px))
-    depth_true = _depth(result, truth, judged)
+    depth_true = _depth(result, truth.disparity, judged)
     errors = {}
     for name, found in candidates.items():
-        scores = score_disparity(found.disparity, truth, judged)
+        scores = score_disparity(found.disparity, truth.disparity, judged)
         depth = _depth(result, found.disparity, judged)
         both = depth.valid & depth_true.valid
         relative = np.abs(depth.depth_m - depth_true.depth_m)[both] / depth_true.depth_m[both]

@@ -41,7 +41,7 @@ SMALL_MAE_PX = 8.0
 @pytest.fixture(scope="module")
 def pair(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("simulated") / "pair"
-    assert main(["simulate", "-o", str(folder), "--sensor", "small"]) == 0
+    assert main(["simulate", "-o", str(folder), "--sensor", "small", "--near-m", "0.8", "--far-m", "1.0"]) == 0
     return folder
 
 
@@ -147,7 +147,7 @@ def test_flipped_byte(pair: Path, tmp_path: Path, capsys: pytest.CaptureFixture[
     content = bytearray((pair / "left.LFR").read_bytes())
     content[len(content) // 2] ^= 0x40
     bad.write_bytes(content)
-    assert "sha1" in refused(capsys, words(pair, tmp_path / "out", left=bad))
+    assert "SHA-1" in refused(capsys, words(pair, tmp_path / "out", left=bad))
 
 
 def test_no_white_image_of_this_camera(pair: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
+import numpy as np
 import pytest
 
 from lfstereo.errors import ConfigError
@@ -49,6 +50,10 @@ def test_toml_round_trip() -> None:
 def test_toml_value_of_a_path_with_a_tab() -> None:
     text = toml_value("a\tb")
     assert tomllib.loads(f"v = {text}") == {"v": "a\tb"}
+
+
+def test_toml_value_of_numpy_numbers() -> None:
+    assert toml_value((np.float64(0.5), True)) == "[0.5, true]"
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,8 @@ from lfstereo.options import add_arguments, from_arguments, read_toml
 from lfstereo.outputs import check_absent
 from lfstereo.pipeline import RunOptions, run_pair
 from lfstereo.progress import StageClock
-from lfstereo.results import Inputs, Report, write_results
+from lfstereo.results import Inputs, Report, read_truth, write_results
+from lfstereo.rig.rectify import rectified_geometry
 from lfstereo.rig.rig import read_rig
 
 
@@ -35,10 +36,11 @@ def run(arguments: argparse.Namespace) -> int:
     table = read_toml(arguments.config).get("run", {}) if arguments.config else {}
     options = from_arguments(RunOptions, arguments, table, f"{arguments.config} [run]")
     rig = read_rig(arguments.rig)
-    inputs = Inputs(arguments.left, arguments.right, arguments.rig, arguments.whites, arguments.truth)
+    inputs = Inputs(arguments.left, arguments.right, arguments.rig)
+    truth = read_truth(arguments.truth, rectified_geometry(rig).size) if arguments.truth else None
     clock = StageClock(bars=sys.stderr.isatty() or not arguments.json)
     result = run_pair(arguments.left, arguments.right, rig, arguments.whites, options, clock)
-    report = write_results(arguments.output, result, inputs, options, clock, arguments.force)
+    report = write_results(arguments.output, result, inputs, options, clock, truth, arguments.force)
     print(json.dumps(report.values(), indent=2) if arguments.json else _text(report, arguments.output))
     return 0
 
