@@ -23,8 +23,8 @@ _NOISE = 1e-4
 def hexagon_weights() -> Float32:
     """Return the weights of the thirteen lenslets around a point on a row of lenslets.
 
-    They are the best linear unbiased estimate (ordinary kriging) for pictures whose amplitude spectrum falls as
-    ``1 / f^1.2``, seen through the round aperture of the lenslets.
+    They are the best linear unbiased estimate (universal kriging) for pictures whose amplitude spectrum falls as
+    ``1 / f^1.2``, seen through the round aperture of the lenslets; surfaces up to second order come out exactly.
 
     Returns
     -------
@@ -49,15 +49,24 @@ def hexagon_weights() -> Float32:
     places = np.array(own + beside) * (_PITCH, 1.0)
     covariance = _covariance()
     count = len(places)
-    system = np.ones((count + 1, count + 1))
-    system[-1, -1] = 0
+    drift = _drift(places)
     between = np.hypot(*(places[:, None] - places[None]).transpose(2, 0, 1))
-    system[:-1, :-1] = np.interp(between, *covariance) + _NOISE * np.eye(count)
+    system = np.zeros((count + drift.shape[1],) * 2)
+    system[:count, :count] = np.interp(between, *covariance) + _NOISE * np.eye(count)
+    system[:count, count:] = drift
+    system[count:, :count] = drift.T
     weights = np.empty((PHASES + 1, count), np.float32)
     for phase in range(PHASES + 1):
-        distance = np.hypot(*(places - ((phase / PHASES - 0.5) * _PITCH, 0)).T)
-        weights[phase] = np.linalg.solve(system, np.append(np.interp(distance, *covariance), 1))[:-1]
+        target = np.array([[(phase / PHASES - 0.5) * _PITCH, 0.0]])
+        right = np.append(np.interp(np.hypot(*(places - target).T), *covariance), _drift(target))
+        weights[phase] = np.linalg.solve(system, right)[:count]
     return weights
+
+
+def _drift(places: Float64) -> Float64:
+    """Return the shapes that must come out exactly: flat, sloping and curved surfaces."""
+    x, y = places.T
+    return np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=1)
 
 
 def _covariance() -> tuple[Float64, Float64]:

@@ -13,7 +13,7 @@ import numpy.typing as npt
 from lfstereo.arrays import Float32, Float64, Rgb, UInt8, Views
 from lfstereo.lenslet.grid import LensletGrid
 from lfstereo.lightfield.field import ViewSampling
-from lfstereo.lightfield.hexagons import PHASES, hexagon_weights
+from lfstereo.lightfield.hexagons import hexagon_weights
 from lfstereo.progress import Progress, silent
 
 _ROWS_PER_TASK = 24
@@ -209,6 +209,7 @@ def _sample_rows(
 ) -> None:  # pragma: no cover
     """Fill rows ``start`` to ``stop`` of the views, keeping three rows of lenslets at a time."""
     rows, lenslets = centres.shape[0], centres.shape[1]
+    blend = np.empty(13, np.float32)
     ring = np.zeros((3, offsets.shape[0], lenslets, 4), np.float32)
     for v in range(max(start - 1, 0), min(start + 1, rows)):
         _sample_lenslets(image, shading, centres[v], offsets, ring[v % 3])
@@ -223,7 +224,10 @@ def _sample_rows(
         for u in range(views.shape[2]):
             position = min(max(first[v] + u * step, 0.0), lenslets - 1.0)
             nearest = int(np.floor(position + 0.5))
-            phase = int(np.floor((position - nearest + 0.5) * PHASES + 0.5))
+            phase = (position - nearest + 0.5) * (table.shape[0] - 1)
+            lower = min(int(phase), table.shape[0] - 2)
+            for tap in range(13):
+                blend[tap] = table[lower, tap] + np.float32(phase - lower) * (table[lower + 1, tap] - table[lower, tap])
             for n in range(offsets.shape[0]):
                 red = green = blue = light = np.float32(0.0)
                 for tap in range(13):
@@ -234,7 +238,7 @@ def _sample_rows(
                     else:
                         source, k = below, nearest + tap - 11 + half
                     k = min(max(k, 0), lenslets - 1)
-                    weight = table[phase, tap]
+                    weight = blend[tap]
                     red += weight * ring[source % 3, n, k, 0]
                     green += weight * ring[source % 3, n, k, 1]
                     blue += weight * ring[source % 3, n, k, 2]
