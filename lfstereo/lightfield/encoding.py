@@ -55,7 +55,7 @@ def srgb_to_linear(coded: UInt8 | UInt16) -> Float32:
 
     Examples
     --------
-    >>> srgb_to_linear(np.array([0, 188, 255], np.uint8)).round(3).tolist()
+    >>> [round(float(v), 3) for v in srgb_to_linear(np.array([0, 188, 255], np.uint8))]
     [0.0, 0.503, 1.0]
     """
     levels = np.iinfo(coded.dtype).max
