@@ -18,6 +18,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     ),
     "simulate": ("lfstereo.cli.simulate", "make a dual-Illum capture of a scene with known depth"),
     "target": ("lfstereo.cli.target", "draw a calibration board to print, and its TOML file"),
+    "calibrate": ("lfstereo.cli.calibrate", "photographs of a calibration board by both cameras to a rig"),
     "decode": ("lfstereo.cli.decode", "raw capture to 4-D light field"),
     "run": ("lfstereo.cli.run", "two captures to disparity, depth, all-in-focus image and point cloud"),
     "train": ("lfstereo.cli.train", "train a network from a recipe"),

@@ -85,11 +85,23 @@ class _Problem:
     def shared(self) -> int:
         return sum(int(m.free.sum()) for m in self.models) + 6 * (len(self.models) - 1)
 
+    @property
+    def precision(self) -> Float64:
+        """Return the inverse variance of what is expected of each free camera parameter."""
+        return np.concatenate([1 / m.expected_sd[m.free] ** 2 for m in self.models])
+
     def surprise(self, state: BundleState) -> tuple[Float64, Float64]:
-        """Return how far the free camera parameters are from what was expected, and the weights of their squares."""
+        """Return how far the free camera parameters are from what was expected, and the weights of their squares.
+
+        A corner counts as one measurement against them however many views it was seen in: what is wrong with it in
+        one view, of a board that is not flat or a lens that is not modelled, is wrong in all.
+        """
         pairs = list(zip(self.models, state.cameras, strict=True))
         away = np.concatenate([(values - m.expected)[m.free] for m, values in pairs])
-        return away, np.concatenate([1 / m.expected_sd[m.free] ** 2 for m, _ in pairs])
+        precision = self.precision
+        shots = [s.sightings for s in self.seen]
+        corners = sum(len(np.unique(shot.corner[shot.weight > 0])) for shot in shots)
+        return away, precision * (sum(float(shot.weight.sum()) for shot in shots) / max(corners, 1))
 
     def columns(self, seen: Seen) -> np.ndarray[tuple[int], np.dtype[np.intp]]:
         """Return the unknowns that a shot depends on, in the order of its derivatives."""
@@ -219,6 +231,9 @@ def _normal_equations(
     away, weight = problem.surprise(state)
     own = np.arange(len(away))
     normal[own, own] += (clip / _CLIP_SIGMAS) ** 2 * weight
+    if meat is not None:
+        views = np.divide(weight, problem.precision, out=np.zeros_like(weight), where=problem.precision > 0)
+        meat[own, own] += (clip / _CLIP_SIGMAS) ** 4 * weight * views
     gradient[own] += (clip / _CLIP_SIGMAS) ** 2 * weight * away
     for seen in problem.seen:
         shot = seen.sightings

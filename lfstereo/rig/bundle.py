@@ -21,9 +21,11 @@ from lfstereo.rig.trust import check_baseline, check_count, check_coverage, chec
 
 SizePair = tuple[tuple[int, int], tuple[int, int]]
 """(width, height) of the left and the right sensor, px."""
-_CENTRE_SD = 0.03
-"""Of the principal point in widths of the frame, and of the centre of distortion in tangents; it only counts where
-the photographs say less."""
+_CENTRE_SD = 0.015
+"""How far principal point and centre of distortion are expected from the middle, in widths of the frame."""
+_BEND_SD = (0.03, 0.01, 0.01)
+"""Expected distortion at half the width by the terms k1, k2, k3, relative; all expectations only count where the
+photographs say less."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,8 +114,9 @@ def solve_rig(
     used = [pair for pair in pairs if usable(pair.left) and usable(pair.right)]
     check_count(len(used), len(pairs))
     used.sort(key=lambda pair: pair.name)
-    models = _models(used, sizes_px, options)
-    result = _adjust(used, points, models, _start(used, points, sizes_px), progress)
+    start = _start(used, points, sizes_px)
+    models = _models(used, sizes_px, [float(camera[0]) for camera in start.cameras], options)
+    result = _adjust(used, points, models, start, progress)
     rejected: list[str] = []
     for _ in range(3):
         bad = _outliers(used, result, options.outlier_factor)
@@ -127,7 +130,7 @@ def solve_rig(
             result.state, rotations=result.state.rotations[kept], translations=result.state.translations[kept]
         )
         result = _adjust(used, points, models, state, progress)
-    return _checked(used, tuple(rejected), points, sizes_px, result, options.pixel_px or pixel_px, options)
+    return _checked(used, tuple(rejected), points, sizes_px, models, result, options.pixel_px or pixel_px, options)
 
 
 def is_pinhole(shots: Sequence[Sightings]) -> bool:
@@ -135,9 +138,11 @@ def is_pinhole(shots: Sequence[Sightings]) -> bool:
     return not any(np.any(shot.offset) for shot in shots)
 
 
-def _models(pairs: Sequence[ShotPair], sizes_px: SizePair, options: RigOptions) -> tuple[LensModel, LensModel]:
+def _models(
+    pairs: Sequence[ShotPair], sizes_px: SizePair, focals_px: Sequence[float], options: RigOptions
+) -> tuple[LensModel, LensModel]:
     models = []
-    for shots, (width, height) in zip(_sides(pairs), sizes_px, strict=True):
+    for shots, (width, height), focal in zip(_sides(pairs), sizes_px, focals_px, strict=True):
         free = np.ones(11, np.bool_)
         free[4:6] = not is_pinhole(shots)
         free[6:9] = np.arange(3) < options.radial_terms
@@ -145,7 +150,8 @@ def _models(pairs: Sequence[ShotPair], sizes_px: SizePair, options: RigOptions) 
         expected, sd = np.zeros(11), np.full(11, np.inf)
         expected[2:4] = (width - 1) / 2, (height - 1) / 2
         sd[2:4] = _CENTRE_SD * width
-        sd[9:] = _CENTRE_SD
+        sd[6:9] = np.array(_BEND_SD) / (0.5 * width / focal) ** np.array([2, 4, 6])
+        sd[9:] = _CENTRE_SD * width / focal
         models.append(LensModel(plenoptic_rays, free, expected, sd))
     return models[0], models[1]
 
@@ -211,6 +217,7 @@ def _checked(
     rejected: tuple[str, ...],
     points: Float64,
     sizes_px: SizePair,
+    models: tuple[LensModel, LensModel],
     result: Adjustment,
     pixel_px: float,
     options: RigOptions,
@@ -220,7 +227,6 @@ def _checked(
         check_poses(state.rotations, state.translations, points)
         for side, shots, size in zip(("left", "right"), _sides(pairs), sizes_px, strict=True):
             check_coverage(side, shots, size)
-    models = _models(pairs, sizes_px, options)
     counts = [int(model.free.sum()) for model in models]
     rig_at = sum(counts)
     covariance = result.covariance[rig_at : rig_at + 6, rig_at : rig_at + 6]

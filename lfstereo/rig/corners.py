@@ -20,11 +20,10 @@ Corners = tuple[np.ndarray[tuple[int], np.dtype[np.intp]], Float64]
 """Rows of ``Target.points`` and their places ``(N, 2)`` in px."""
 _VIEW_PIXELS = ViewSampling(origin_px=(0.0, 0.0), step_px=(1.0, 1.0), rotation_rad=0.0, view_step_px=1.0)
 _LEAST_CORNERS = 8
-_ENLARGED_BELOW_PX = 1400
-"""Centre views smaller than this are enlarged before the board is searched."""
+_SCALES, _LARGEST_PX = (2, 1, 3, 4, 6), 2600
+"""The centre view is searched enlarged by each of these in turn, up to this size: no one suits all squares."""
 _WINDOW, _WINDOW_CHARUCO = 0.4, 0.22
 """Half a refinement window in sides of a square."""
-_PATTERN_FLAGS = cv2.CALIB_CB_EXHAUSTIVE | cv2.CALIB_CB_ACCURACY | cv2.CALIB_CB_NORMALIZE_IMAGE
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,12 +99,14 @@ def find_board(picture: UInt8, target: Target, source: str) -> Corners:
     TargetNotFoundError
         If the board is not found, or of a charuco board fewer than eight corners.
     """
-    scale = max(1, min(4, math.ceil(_ENLARGED_BELOW_PX / max(picture.shape))))
-    large = cv2.resize(picture, None, fx=scale, fy=scale, interpolation=cv2.INTER_CUBIC) if scale > 1 else picture
-    if target.kind == "charuco":
-        found = _charuco(large, target)
-    else:
-        found = _checkerboard(large, target)
+    search = _charuco if target.kind == "charuco" else _checkerboard
+    scales = [scale for scale in _SCALES if scale == 1 or scale * max(picture.shape) <= _LARGEST_PX]
+    found, scale = None, 1
+    for scale in scales:
+        large = cv2.resize(picture, None, fx=scale, fy=scale, interpolation=cv2.INTER_CUBIC) if scale > 1 else picture
+        found = search(large, target)
+        if found is not None:
+            break
     if found is None:
         what = f"{target.kind} of {target.corners[0]} x {target.corners[1]} corners"
         seen = "whole" if target.kind == "checkerboard" else f"with {_LEAST_CORNERS} corners or more"
@@ -140,7 +141,9 @@ class _Motion:
 
 
 def _checkerboard(picture: UInt8, target: Target) -> Corners | None:
-    found, place = cv2.findChessboardCornersSB(picture, target.corners, flags=_PATTERN_FLAGS)
+    found, place = cv2.findChessboardCornersSB(picture, target.corners, flags=cv2.CALIB_CB_EXHAUSTIVE)
+    if not found:
+        found, place = cv2.findChessboardCorners(picture, target.corners)
     if not found:
         return None
     place = place.reshape(-1, 2).astype(np.float64)

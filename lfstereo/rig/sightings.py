@@ -10,6 +10,9 @@ import numpy as np
 from lfstereo.arrays import Bool, Float64
 from lfstereo.errors import ShapeError
 
+_SAME_VIEW = 0.1
+"""Positions that differ by less than this share of the pupil's radius belong to one view, or one block of views."""
+
 
 @dataclass(frozen=True, slots=True)
 class Sightings:
@@ -38,9 +41,12 @@ class Sightings:
         """Return the corners seen in the view nearest to the centre and their places ``(N, 2)``."""
         used = np.flatnonzero(self.weight > 0)
         away = np.abs(self.offset[used]).max(axis=1)
-        nearest = used[away <= away.min() + 1e-6]
-        first = nearest[np.all(self.offset[nearest] == self.offset[nearest[0]], axis=1)]
-        return self.corner[first], self.place[first]
+        order = used[np.argsort(away, kind="stable")]
+        _, first = np.unique(self.corner[order], return_index=True)
+        nearest = order[first]
+        near = np.abs(self.offset[nearest]).max(axis=1)
+        nearest = nearest[near <= near.min() + _SAME_VIEW * away.max()]
+        return self.corner[nearest], self.place[nearest]
 
 
 def reach_px(shots: Sequence[Sightings]) -> tuple[Float64, Float64]:

@@ -1,0 +1,153 @@
+"""One picture that shows how good a calibration is: coverage, residuals, errors per shot, where the boards were."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from lfstereo.arrays import Float64, UInt8
+from lfstereo.outputs import atomic_file
+from lfstereo.rig.adjust import points_in_camera
+from lfstereo.rig.bundle import RigSolution
+
+_WIDTH, _PANEL, _GAP = 1400, 440, 30
+_INK, _LEFT, _RIGHT, _BAD = (40, 40, 40), (180, 90, 20), (30, 110, 200), (40, 40, 200)
+"""Blue-green-red."""
+_SIDES = ("left", "right")
+_CELLS = (12, 8)
+
+
+def write_report(path: Path, solution: RigSolution, points: Float64, force: bool = False) -> None:
+    """Write the report picture as PNG.
+
+    Raises
+    ------
+    OutputError
+        If the file exists and ``force`` is not set, or cannot be written.
+    """
+    encoded = cv2.imencode(".png", draw_report(solution, points))[1]
+    with atomic_file(path, force) as scratch:
+        scratch.write_bytes(encoded.tobytes())
+
+
+def draw_report(solution: RigSolution, points: Float64) -> UInt8:
+    """Return the report, ``(H, W, 3)`` blue-green-red."""
+    page: UInt8 = np.full((3 * _PANEL + 4 * _GAP + 70, _WIDTH, 3), 255, np.uint8)
+    rig = solution.rig
+    _text(page, f"baseline {rig.baseline_m * 1e3:.3f} +- {solution.baseline_sd_m * 1e3:.3f} mm", (_GAP, 40), 0.8)
+    turns = ", ".join(f"{np.degrees(sd):.4f}" for sd in solution.rotation_sd_rad)
+    _text(page, f"rotation known to {turns} deg; residual {solution.sigma_px:.2f} sensor px", (_GAP + 420, 40), 0.6)
+    if solution.rejected:
+        _text(page, f"rejected: {', '.join(solution.rejected)}", (_GAP, 66), 0.6, _BAD)
+    half = (_WIDTH - 3 * _GAP) // 2
+    top = 70 + _GAP
+    for number, side in enumerate(_SIDES):
+        x = _GAP + number * (half + _GAP)
+        page[top : top + _PANEL, x : x + half] = _coverage(solution, side, half)
+        below = top + _PANEL + _GAP
+        page[below : below + _PANEL, x : x + half] = _residual_map(solution, side, half)
+    below = top + 2 * (_PANEL + _GAP)
+    page[below : below + _PANEL, _GAP : _GAP + half] = _bars(solution, half)
+    page[below : below + _PANEL, 2 * _GAP + half : 2 * _GAP + 2 * half] = _from_above(solution, points, half)
+    return page
+
+
+def _panel(title: str, width: int) -> UInt8:
+    panel: UInt8 = np.full((_PANEL, width, 3), 255, np.uint8)
+    _text(panel, title, (4, 18), 0.55)
+    return panel
+
+
+def _frame(panel: UInt8, size: tuple[int, int]) -> tuple[float, Float64]:
+    """Draw the sensor's outline; return px of the panel per sensor px and where the sensor begins."""
+    scale = min((panel.shape[1] - 10) / size[0], (panel.shape[0] - 40) / size[1])
+    origin = np.array([5.0, 30.0])
+    end = origin + np.asarray(size) * scale
+    cv2.rectangle(panel, (5, 30), (int(end[0]), int(end[1])), _INK, 1)
+    return scale, origin
+
+
+def _coverage(solution: RigSolution, side: str, width: int) -> UInt8:
+    panel = _panel(f"{side}: corners in the centre view, one colour per shot", width)
+    scale, origin = _frame(panel, getattr(solution.rig, side).sensor_px)
+    for number, pair in enumerate(solution.pairs):
+        hue = np.array([[[int(number * 47) % 180, 200, 190]]], np.uint8)
+        colour = tuple(int(c) for c in cv2.cvtColor(hue, cv2.COLOR_HSV2BGR)[0, 0])
+        for x, y in getattr(pair, side).centre_view()[1] * scale + origin:
+            cv2.circle(panel, (round(x), round(y)), 2, colour, -1, cv2.LINE_AA)
+    return panel
+
+
+def _residual_map(solution: RigSolution, side: str, width: int) -> UInt8:
+    """Draw the mean residual of each part of the frame as an arrow, over all shots and views."""
+    size = getattr(solution.rig, side).sensor_px
+    number = _SIDES.index(side)
+    places, misses = [], []
+    for pair, residual in zip(solution.pairs, solution.adjustment.residuals[number::2], strict=True):
+        shot = getattr(pair, side)
+        places.append(shot.place[shot.weight > 0])
+        misses.append(residual[shot.weight > 0])
+    place, miss = np.concatenate(places), np.concatenate(misses)
+    longest = max(2 * solution.sigma_px, 1e-9)
+    panel = _panel(f"{side}: mean residual, px; a whole cell = {longest:.2f} sensor px", width)
+    scale, origin = _frame(panel, size)
+    cell = np.clip((place / size * _CELLS).astype(int), 0, np.array(_CELLS) - 1)
+    side_px = np.asarray(size) / _CELLS * scale
+    for column, row in np.unique(cell, axis=0):
+        inside = np.all(cell == (column, row), axis=1)
+        start = origin + (np.array([column, row]) + 0.5) * side_px
+        end = start + np.clip(np.median(miss[inside], axis=0) / longest, -1, 1) * side_px.min()
+        cv2.arrowedLine(panel, _point(start), _point(end), _RIGHT if number else _LEFT, 2, cv2.LINE_AA, 0, 0.3)
+        cv2.circle(panel, _point(start), 2, _INK, -1)
+    return panel
+
+
+def _bars(solution: RigSolution, width: int) -> UInt8:
+    errors = solution.errors
+    top = max(error.rms_px for error in errors)
+    panel = _panel(f"rms residual per shot, sensor px (tallest {top:.2f}); left and right camera", width)
+    step = (width - 20) / len(solution.pairs)
+    worst = max(errors, key=lambda error: error.rms_px)
+    for number, error in enumerate(errors):
+        x = 10 + step * (number // 2) + (step * 0.42 if error.side == "right" else 0)
+        height = (_PANEL - 70) * error.rms_px / top
+        foot = _PANEL - 28
+        colour = _RIGHT if error.side == "right" else _LEFT
+        cv2.rectangle(panel, _point((x, foot - height)), _point((x + step * 0.36, foot)), colour, -1)
+        if error.side == "left":
+            _text(panel, error.name[-8:], (int(x), _PANEL - 12), 0.35)
+    _text(panel, f"worst: {worst.name} {worst.side}", (4, 38), 0.5, _BAD)
+    return panel
+
+
+def _from_above(solution: RigSolution, points: Float64, width: int) -> UInt8:
+    """Draw the boards seen from above: x to the right, distance upwards."""
+    state = solution.adjustment.state
+    boards = [points_in_camera(state, points, 0, n)[:, [0, 2]] for n in range(len(solution.pairs))]
+    right = solution.rig.right_centre_m[[0, 2]]
+    everything = np.concatenate([*boards, [[0, 0], right]])
+    low, high = everything.min(axis=0), everything.max(axis=0)
+    scale = float(min((width - 40) / (high - low)[0], (_PANEL - 70) / (high - low)[1]))
+    first = (width - (high - low)[0] * scale) / 2
+    panel = _panel(f"boards and cameras from above; {low[1]:.2f} to {high[1]:.2f} m", width)
+
+    def at(place: Float64) -> tuple[int, int]:
+        return _point((first + (place[0] - low[0]) * scale, _PANEL - 20 - (place[1] - low[1]) * scale))
+
+    for board in boards:
+        hull = cv2.convexHull(np.array([at(place) for place in board], np.int32))
+        cv2.polylines(panel, [hull], True, _INK, 1, cv2.LINE_AA)
+    for centre, turn, colour in ((np.zeros(2), np.eye(3), _LEFT), (right, solution.rig.right_from_left, _RIGHT)):
+        cv2.circle(panel, at(centre), 5, colour, -1, cv2.LINE_AA)
+        cv2.line(panel, at(centre), at(centre + 0.25 * high[1] * turn[2, [0, 2]]), colour, 1, cv2.LINE_AA)
+    return panel
+
+
+def _point(place: Float64 | tuple[float, float]) -> tuple[int, int]:
+    return round(float(place[0])), round(float(place[1]))
+
+
+def _text(panel: UInt8, text: str, place: tuple[int, int], size: float, colour: tuple[int, int, int] = _INK) -> None:
+    cv2.putText(panel, text, place, cv2.FONT_HERSHEY_SIMPLEX, size, colour, 1, cv2.LINE_AA)

@@ -1,0 +1,133 @@
+"""Open the photographs of a calibration session and find the target in each."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from lfstereo.arrays import Float32
+from lfstereo.container.capture import Capture, read_capture
+from lfstereo.errors import AssetError, TargetNotFoundError
+from lfstereo.lenslet.grid import LensletGrid
+from lfstereo.lenslet.white import find_white_image
+from lfstereo.lightfield.decoding import calibrate, views_from
+from lfstereo.lightfield.field import LightField
+from lfstereo.lightfield.store import SUFFIXES, read_light_field
+from lfstereo.progress import Progress, silent
+from lfstereo.rig.bundle import ShotPair, SizePair
+from lfstereo.rig.corners import CornerOptions, find_corners
+from lfstereo.rig.sightings import Sightings, merge_views
+from lfstereo.rig.target import Target
+
+_BLOCKS = 5
+"""Views are averaged over this many blocks in both directions; see :func:`merge_views`."""
+
+
+@dataclass(frozen=True, slots=True)
+class Session:
+    """What a session's photographs show."""
+
+    pairs: tuple[ShotPair, ...]
+    sizes_px: SizePair
+    pixel_px: float
+    """Sensor px per px of a view."""
+    unusable: tuple[tuple[str, str], ...]
+    """Name of each shot without a target, and why."""
+
+
+def see_targets(
+    shots: Sequence[tuple[str, Path, Path]],
+    target: Target,
+    whites: Path | None,
+    options: CornerOptions = CornerOptions(),
+    progress: Progress = silent,
+) -> Session:
+    """Open all shots of both cameras and find the target in all their views.
+
+    Parameters
+    ----------
+    shots
+        Name, left and right capture of each; raw or light fields.
+    target
+        The board.
+    whites
+        Folder of the cameras' white images, needed for raw captures.
+
+    Raises
+    ------
+    AssetError
+        If raw captures come without white images, or one side's shots differ in camera, zoom, focus or size.
+    TargetNotFoundError
+        If no shot shows the target to both cameras.
+    """
+    sides = (_Side("left", whites), _Side("right", whites))
+    pairs, unusable = [], []
+    for done, (name, *paths) in enumerate(shots):
+        seen: list[Sightings] = []
+        for number, (side, path) in enumerate(zip(sides, paths, strict=True)):
+            light_field = side.open(path)
+            try:
+                seen.append(merge_views(find_corners(light_field, target, options), _BLOCKS))
+            except TargetNotFoundError as error:
+                unusable.append((name, str(error)))
+                break
+            del light_field
+            progress(2 * done + number + 1, 2 * len(shots))
+        if len(seen) == 2:
+            pairs.append(ShotPair(name, seen[0], seen[1]))
+    if not pairs:
+        raise TargetNotFoundError(
+            f"none of {len(shots)} shots shows the target to both cameras; the first: {unusable[0][1]}"
+            if unusable
+            else "found no shots, expected photographs of the target by both cameras"
+        )
+    return Session(tuple(pairs), (sides[0].size_px, sides[1].size_px), sides[0].pixel_px, tuple(unusable))
+
+
+@dataclass(slots=True)
+class _Side:
+    """One camera's shots: the state that they must share, and grids already fitted."""
+
+    name: str
+    whites: Path | None
+    first: str = ""
+    state: tuple[object, ...] = ()
+    size_px: tuple[int, int] = (0, 0)
+    pixel_px: float = 1.0
+    grids: dict[str, tuple[LensletGrid, Float32]] = field(default_factory=dict)
+
+    def open(self, path: Path) -> LightField:
+        if path.suffix.lower() in SUFFIXES:
+            light_field = read_light_field(path)
+            self._agree(path, (light_field.serial, light_field.views.shape[2:4]))
+            rows, columns = light_field.views.shape[2:4]
+            step = light_field.sampling.step_px if light_field.sampling else (1.0, 1.0)
+            self.size_px, self.pixel_px = (round(columns * step[0]), round(rows * step[1])), step[1]
+            return light_field
+        capture = read_capture(path)
+        found = capture.metadata
+        self._agree(path, (found.serial, (found.height, found.width), found.lens.zoom_step, found.lens.focus_step))
+        light_field = self._decoded(capture, path)
+        self.size_px = (found.width, found.height)
+        self.pixel_px = light_field.sampling.step_px[1] if light_field.sampling else 1.0
+        return light_field
+
+    def _decoded(self, capture: Capture, path: Path) -> LightField:
+        if self.whites is None:
+            raise AssetError(f"{path}: a raw capture needs the camera's white images; give their folder with --whites")
+        white = find_white_image(self.whites, capture.metadata)
+        if white.source not in self.grids:
+            self.grids[white.source] = calibrate(capture, white)
+        return views_from(capture, *self.grids[white.source])
+
+    def _agree(self, path: Path, state: tuple[object, ...]) -> None:
+        if not self.first:
+            self.first, self.state = str(path), state
+        names = ("camera", "picture size", "zoom step", "focus step")
+        for name, found, expected in zip(names, state, self.state, strict=False):
+            if found != expected:
+                raise AssetError(
+                    f"{path}: {name} {found}, expected {expected} as {self.first}; all {self.name} shots must be "
+                    "taken by one camera without touching zoom and focus; move this one away"
+                )

@@ -1,0 +1,50 @@
+"""Pair the photographs of a target that the two cameras took."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from lfstereo.errors import AssetError
+
+SUFFIXES = (".lfr", ".lfp", ".raw", ".h5", ".hdf5")
+_SIDE = re.compile(r"(?i)(?:^|[^a-z])(left|right)(?:[^a-z]|$)")
+
+
+def pair_shots(left: Path, right: Path) -> list[tuple[str, Path, Path]]:
+    """Return (name, left capture, right capture) of every shot.
+
+    Files belong together that have the same name once "left" and "right" are taken out of it; where no name agrees,
+    those at the same place in the order of names. Both folders may be the same if the names tell the sides.
+
+    Raises
+    ------
+    AssetError
+        If a folder is missing or holds no captures, or a capture has no partner.
+    """
+    found = [_captures(left, "left"), _captures(right, "right")]
+    named = [{_SIDE.sub("", path.stem): path for path in side} for side in found]
+    if not named[0].keys() & named[1].keys() and len(found[0]) == len(found[1]):
+        return [(a.stem, a, b) for a, b in zip(*found, strict=True)]
+    lonely = sorted(named[0].keys() ^ named[1].keys())
+    if lonely:
+        side = int(lonely[0] not in named[0])
+        other = (left, right)[1 - side]
+        raise AssetError(
+            f"{named[side][lonely[0]]}: found no partner in {other}, expected a capture of the same name; "
+            "copy it there or move this one away"
+        )
+    return [(name, named[0][name], named[1][name]) for name in sorted(named[0])]
+
+
+def _captures(folder: Path, side: str) -> list[Path]:
+    if not folder.is_dir():
+        raise AssetError(f"{folder}: found no such folder, expected the {side} camera's photographs of the target")
+    captures = sorted(path for path in folder.iterdir() if path.suffix.lower() in SUFFIXES)
+    sides = {path: match.group(1).lower() for path in captures if (match := _SIDE.search(path.stem))}
+    own = [path for path in captures if sides.get(path, side) == side]
+    if not own:
+        raise AssetError(
+            f"{folder}: found no capture of the {side} camera, expected files ending in {', '.join(SUFFIXES)}"
+        )
+    return own
