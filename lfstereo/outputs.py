@@ -25,6 +25,22 @@ def check_absent(target: Path, force: bool) -> None:
         raise OutputError(f"{target}: exists already; give another output path, or --force to replace it")
 
 
+def check_space(target: Path, size_bytes: int) -> None:
+    """Refuse to begin a large file for which the disk has no room.
+
+    Raises
+    ------
+    OutputError
+        If less than ``size_bytes`` are free where ``target`` is to lie.
+    """
+    place = next((p for p in target.absolute().parents if p.is_dir()), Path())
+    free = shutil.disk_usage(place).free
+    if free < size_bytes:
+        raise OutputError(
+            f"{target}: the disk is full; needs {size_bytes / 2**20:.0f} MiB, {free / 2**20:.0f} MiB are free"
+        )
+
+
 @contextmanager
 def atomic_file(target: Path, force: bool = False) -> Iterator[Path]:
     """Give a scratch path beside ``target``; rename it to ``target`` when the block ends without an error.
@@ -64,6 +80,8 @@ def atomic_folder(target: Path, force: bool = False) -> Iterator[Path]:
             scratch.mkdir(parents=True)
             yield scratch
             _swap(scratch, target)
+    except OutputError as error:
+        raise OutputError(str(error).replace(str(scratch), str(target))) from error
     finally:
         shutil.rmtree(scratch, ignore_errors=True)
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from lfstereo.errors import OutputError
-from lfstereo.outputs import atomic_file, atomic_folder
+from lfstereo.outputs import atomic_file, atomic_folder, check_space
 
 
 def test_file_appears_at_the_end(tmp_path: Path) -> None:
@@ -62,3 +62,19 @@ def test_an_error_inside_passes_through_and_leaves_nothing(tmp_path: Path) -> No
         (scratch / "half").touch()
         raise KeyboardInterrupt
     assert list(tmp_path.iterdir()) == []
+
+
+def test_no_room_for_a_large_file(tmp_path: Path) -> None:
+    check_space(tmp_path / "new" / "small.h5", 1)
+    with pytest.raises(OutputError, match=r"large\.h5: the disk is full; needs 1125899906842624 MiB"):
+        check_space(tmp_path / "new" / "large.h5", 2**70)
+
+
+def test_a_file_inside_a_folder_is_named_by_its_final_place(tmp_path: Path) -> None:
+    message = str(tmp_path / "out" / "a.txt")
+    with (
+        pytest.raises(OutputError, match=message),
+        atomic_folder(tmp_path / "out") as scratch,
+        atomic_file(scratch / "a.txt"),
+    ):
+        raise OSError(errno.ENOSPC, "no space")

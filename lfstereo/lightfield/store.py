@@ -13,7 +13,7 @@ from lfstereo.errors import ContainerError
 from lfstereo.lightfield.encoding import from_codes, to_codes
 from lfstereo.lightfield.field import LightField, ViewSampling
 from lfstereo.lightfield.views_folder import read_views_folder
-from lfstereo.outputs import atomic_file
+from lfstereo.outputs import atomic_file, check_absent, check_space
 
 SUFFIXES = (".h5", ".hdf5")
 FORMAT_NAME = "lfstereo light field"
@@ -70,10 +70,12 @@ def write_light_field(path: Path, light_field: LightField, force: bool = False) 
     ContainerError
         If the file name has another suffix.
     OutputError
-        If the file exists and ``force`` is not set, or it cannot be written.
+        If the file exists and ``force`` is not set, or it cannot be written, or the disk has no room for it.
     """
     check_suffix(path)
     views = light_field.views
+    check_absent(path, force)
+    check_space(path, views.size * 2 + (0 if light_field.weight is None else light_field.weight.size))
     peak = max(1.0, float(views.max(initial=0.0)))
     with atomic_file(path, force) as scratch, h5py.File(scratch, "w") as file:
         stored = file.create_dataset("views", views.shape, np.uint16, chunks=(1, 1, *views.shape[2:]))
