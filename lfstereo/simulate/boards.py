@@ -9,12 +9,13 @@ from scipy.spatial.transform import Rotation
 
 from lfstereo.arrays import Float64
 from lfstereo.errors import ConfigError
-from lfstereo.rig.rig import PlenopticCamera
+from lfstereo.rig.target import Target
 from lfstereo.simulate import texture as paint
 from lfstereo.simulate.options import SimulateOptions
 from lfstereo.simulate.primitives import PATCH
 from lfstereo.simulate.rigs import SimulatedRig
 from lfstereo.simulate.scene import Scene, Surface, even_light, primitive
+from lfstereo.simulate.truth import on_sensor
 
 _DEFAULTS: dict[str, tuple[tuple[int, int], float]] = {"illum": ((19, 14), 0.010), "small": ((7, 6), 0.0035)}
 _TRIES = 4000
@@ -43,19 +44,30 @@ class BoardPose:
         return points
 
 
+def board_target(options: SimulateOptions) -> Target:
+    """Return the board of the calibration shots.
+
+    Raises
+    ------
+    ConfigError
+        If the options describe a board that cannot be told from itself upside down.
+    """
+    corners, square = _DEFAULTS[options.sensor]
+    return Target("checkerboard", options.board_corners or corners, options.board_square_m or square)
+
+
 def draw_poses(options: SimulateOptions, rig: SimulatedRig) -> list[BoardPose]:
     """Draw board poses spread over the working range, whole in the view of both cameras.
 
     Raises
     ------
     ConfigError
-        If the board does not fit into the common field of view.
+        If the board cannot be used, or does not fit into the common field of view.
     """
-    corners, square = _DEFAULTS[options.sensor]
-    corners, square = options.board_corners or corners, options.board_square_m or square
+    target = board_target(options)
     rng = np.random.default_rng([options.seed, 0xB0A2])
     depths = options.near_m + (options.far_m - options.near_m) * (0.04 + 0.84 * _spread(options.boards))
-    return [_draw(rng, float(z), corners, square, options, rig) for z in depths]
+    return [_draw(rng, float(z), target.corners, target.square_m, options, rig) for z in depths]
 
 
 def board_scene(pose: BoardPose, options: SimulateOptions, rig: SimulatedRig) -> Scene:
@@ -104,19 +116,12 @@ def _draw(
         edge = np.array([[i, j, 0.0] for i in (-2, corners[0] + 1) for j in (-2, corners[1] + 1)]) * square
         in_left = edge @ bar[:, :3].T + bar[:, 3]
         in_right = in_left @ stereo.right_from_left.T + stereo.translation_m
-        if _whole(in_left, stereo.left) and _whole(in_right, stereo.right):
+        if np.all(on_sensor(in_left, stereo.left, _MARGIN_PX) & on_sensor(in_right, stereo.right, _MARGIN_PX)):
             return pose
     raise ConfigError(
         f"a board of {corners[0]} x {corners[1]} corners, {square * 1e3:g} mm apart, does not fit into both "
         f"views anywhere near {options.focus_m:.2f} m; give a smaller board_square_m or fewer board_corners"
     )
-
-
-def _whole(points: Float64, camera: PlenopticCamera) -> bool:
-    x = camera.focal_px[0] * points[:, 0] / points[:, 2] + camera.principal_px[0]
-    y = camera.focal_px[1] * points[:, 1] / points[:, 2] + camera.principal_px[1]
-    inside = [np.all((v > _MARGIN_PX) & (v < n - _MARGIN_PX)) for v, n in zip((x, y), camera.sensor_px, strict=True)]
-    return bool(all(inside))
 
 
 def _triple(values: Float64) -> tuple[float, float, float]:

@@ -44,6 +44,8 @@ class SimulatedCamera:
     """Stretch of the array along its own x and y."""
     principal_px: tuple[float, float]
     """(cx, cy) of the optical axis on the sensor, 0-based px."""
+    distortion_k1: float = 0.0
+    """Picture points move out from the axis to ``r (1 + k1 r^2)``, r the tangent of the ideal direction."""
 
     @property
     def image_distance_m(self) -> float:
@@ -90,7 +92,7 @@ class SimulatedCamera:
         return lattice
 
     def optics(self) -> Float64:
-        """Return the numbers that the ray tracer needs, ``(10,)``; see ``trace``."""
+        """Return the numbers that the ray tracer needs, ``(11,)``; see ``trace``."""
         return np.array(
             [
                 self.principal_px[0],
@@ -103,6 +105,7 @@ class SimulatedCamera:
                 _RIM_DISTANCE * self.focal_length_m,
                 _RIM_RADIUS * self.pupil_radius_m,
                 LENSLET_PITCH_M,
+                self.distortion_k1,
             ]
         )
 
@@ -115,6 +118,7 @@ class SimulatedCamera:
             principal_px=self.principal_px,
             focus_distance_m=self.focus_m,
             pupil_m_per_px=self.pupil_m_per_px,
+            distortion=(self.distortion_k1, 0.0, 0.0, 0.0, 0.0),
         )
 
 

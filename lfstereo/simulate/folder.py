@@ -11,7 +11,8 @@ from lfstereo.outputs import atomic_folder
 from lfstereo.progress import Progress, silent
 from lfstereo.rig.rectify import Side
 from lfstereo.rig.rig import write_rig
-from lfstereo.simulate.boards import BoardPose, board_scene, draw_poses
+from lfstereo.rig.target import write_target
+from lfstereo.simulate.boards import BoardPose, board_scene, board_target, draw_poses
 from lfstereo.simulate.capture import take_picture, take_white_image
 from lfstereo.simulate.frame_metadata import ZOOM_FOCUS_NUMBER
 from lfstereo.simulate.options import SimulateOptions
@@ -30,8 +31,8 @@ def write_simulation(
     """Simulate a session and write it: captures, white images, rig, truth, calibration shots; whole or not at all.
 
     The folder gets ``left.LFR``, ``right.LFR``, ``whites/<serial>/MOD_0015.RAW`` with text file and list of hot pixels,
-    ``rig.toml``, ``truth/``, with boards ``boards/NN_left.LFR``, ``NN_right.LFR`` and ``boards/poses.toml``,
-    and ``simulation.toml`` with the options.
+    ``rig.toml``, ``truth/``, with boards ``boards/NN_left.LFR``, ``NN_right.LFR``, ``target.toml`` for the
+    calibration and ``poses.toml`` with the truth, and ``simulation.toml`` with the options.
 
     Raises
     ------
@@ -54,6 +55,7 @@ def write_simulation(
         if poses:
             (scratch / "boards").mkdir()
             (scratch / "boards" / "poses.toml").write_text(_poses_toml(poses), "utf-8")
+            write_target(scratch / "boards" / "target.toml", board_target(options))
         for number, pose in enumerate(poses):
             shot = board_scene(pose, options, rig)
             _write_pair(scratch / "boards", f"{number:02d}_", shot, rig, options, 100 + number, steps)

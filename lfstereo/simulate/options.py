@@ -20,6 +20,7 @@ class SimulateOptions:
     focal_length_m: float = option(0.020, "focal length of the main lenses", "m")
     f_number: float = option(2.0, "aperture of the main lenses")
     focus_m: float = option(0.85, "depth on which both main lenses are focused", "m")
+    distortion_k1: float = option(0.0, "radial distortion of both lenses: r (1 + k1 r^2), r = tangent off the axis")
     baseline_m: float = option(0.095, "distance between the two pupils", "m")
     near_m: float = option(0.60, "near end of the working range", "m")
     far_m: float = option(1.20, "far end of the working range, where the background is", "m")
@@ -44,8 +45,7 @@ class SimulateOptions:
         _check("samples", self.samples, self.samples <= 1024, "at most 1024")
         _check("boards", self.boards, self.boards <= 99, "at most 99")
         _check("f_number", self.f_number, self.f_number >= 1.8, "1.8 or more, or micro-images overlap")
-        if self.board_corners is not None:
-            _check("board_corners", self.board_corners, min(self.board_corners) >= 2, "at least 2 in both directions")
+        _check("distortion_k1", self.distortion_k1, abs(self.distortion_k1) <= 0.5, "-0.5 to 0.5")
         if self.board_square_m is not None:
             _check("board_square_m", self.board_square_m, self.board_square_m > 0, "a positive number")
 

@@ -63,12 +63,13 @@ def _camera(options: SimulateOptions, side: str) -> SimulatedCamera:
         sensor_px=(width, height),
         focal_length_m=options.focal_length_m * (1.0 if left else 1.001),
         f_number=options.f_number,
-        focus_m=options.focus_m,
+        focus_m=options.focus_m * (1.0 if left else 1.003),
         lenslet_gap_m=38.4e-6 if left else 38.1e-6,
         lenslet_offset_m=(8.42e-6, -0.95e-6) if left else (-5.34e-6, 2.06e-6),
         lenslet_rotation_rad=-5.4e-4 if left else 3.1e-4,
         lenslet_scale=(1.0, 1.000343) if left else (1.0, 0.99983),
         principal_px=((width - 1) / 2 + shift[0] * scale, (height - 1) / 2 + shift[1] * scale),
+        distortion_k1=options.distortion_k1 * (1.0 if left else 0.94),
     )
 
 

@@ -2,7 +2,8 @@
 
 For a pixel the nearest micro-image centre tells its lenslet at ``m`` on the array and the offset inside the
 micro-image its pupil point ``p``. Lenslets are focused on the pupil, so the pixel's light passes ``p`` and the area of
-the lenslet; the main lens sends the ray that reaches ``x_m`` through the point ``x_m Z_f / D`` of the plane of focus.
+the lenslet; the main lens sends the ray that reaches ``x_m`` through the point ``x_m Z_f / D`` of the plane of focus
+(undistorted first where the lens distorts).
 """
 
 from __future__ import annotations
@@ -144,15 +145,22 @@ def _vignetting_rows(share: Float32, optics: Float64, lattice: Float64) -> None:
 
 
 @compiled
+def _undistorted(x: float, y: float, k1: float) -> float:
+    """Return by what to multiply a distorted direction (tangents) to get the ideal one."""
+    bent, gain = x * x + y * y, 1.0
+    for _ in range(8):
+        gain = 1 / (1 + k1 * bent * gain * gain)
+    return gain
+
+
+@compiled
 def _wrapped(u: float) -> float:
     return u - math.floor(u)
 
 
 @compiled
-def _in_lenslet(u: float, v: float, pitch: float) -> tuple[float, float]:
-    """Return a point of a hexagon of the given width, its neighbours along x, from two uniform numbers."""
-    third = int(3 * u)
-    u = 3 * u - third
+def _in_lenslet(third: int, u: float, v: float, pitch: float) -> tuple[float, float]:
+    """Return a point in a third of a hexagon of the given width, its neighbours along x, from two uniform numbers."""
     # Three rhombi between corners at 30, 150 and 270 degrees fill the hexagon.
     if third == 0:
         return pitch * 0.5 * (u - v), pitch * _SIXTH * (u + v)
@@ -179,6 +187,7 @@ def _trace_rows(
         y = start + n
         among, entry = np.empty(scene.shape[0], np.int64), np.empty(scene.shape[0])
         count, last_x, last_y = 0, 1e30, 1e30
+        ux, uy = 0.0, 0.0
         for x in range(light_out.shape[1]):
             cx, cy = _lenslet_of(x, y, lattice)
             mx, my = (cx - optics[0]) * optics[2], (cy - optics[1]) * optics[2]
@@ -186,23 +195,25 @@ def _trace_rows(
             if share < _DARK:
                 continue
             if cx != last_x or cy != last_y:
-                count = candidates(
-                    scene, extents, mx / distance, my / distance, focus, aperture, pitch / distance, among, entry
-                )
+                ux, uy = mx / distance, my / distance
+                if optics[10] != 0:
+                    gain = _undistorted(ux, uy, optics[10])
+                    ux, uy = gain * ux, gain * uy
+                count = candidates(scene, extents, ux, uy, focus, aperture, pitch / distance, among, entry)
                 last_x, last_y = cx, cy
             red, green, blue = 0.0, 0.0, 0.0
             h0, h1 = lattice_random(x, y, 0, 77), lattice_random(x, y, 1, 77)
             h2, h3 = lattice_random(x, y, 2, 77), lattice_random(x, y, 3, 77)
             for k in range(samples):
-                # Roberts' R4 sequence, shifted by a hash of the pixel.
+                # Low-discrepancy sequences over pixel and lenslet (Roberts 2018), shifted by a hash of the pixel.
                 u0, u1 = _wrapped(h0 + 0.8566749 * k), _wrapped(h1 + 0.7338918 * k)
-                u2, u3 = _wrapped(h2 + 0.6287067 * k), _wrapped(h3 + 0.5385973 * k)
+                u2, u3 = _wrapped(h2 + 0.7548776662 * k), _wrapped(h3 + 0.5698402910 * k)
                 px, py = (x + _WIDTH_PX * (u0 - 0.5) - cx) * per_px, (y + _WIDTH_PX * (u1 - 0.5) - cy) * per_px
                 beyond = (px * px + py * py) / (aperture * aperture)
                 if beyond > 1:
                     px, py = px / math.sqrt(beyond), py / math.sqrt(beyond)
-                qx, qy = _in_lenslet(u2, u3, pitch)
-                fx, fy = (mx + qx) * focus / distance, (my + qy) * focus / distance
+                qx, qy = _in_lenslet((k + x + y) % 3, u2, u3, pitch)
+                fx, fy = (ux + qx / distance) * focus, (uy + qy / distance) * focus
                 dx, dy = (fx - px) / focus, (fy - py) / focus
                 which, t = nearest(scene, among, entry, count, px, py, 0.0, dx, dy, 1.0)
                 if which < 0:

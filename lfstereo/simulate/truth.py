@@ -59,8 +59,8 @@ def true_maps(scene: Scene, rig: StereoRig, oversample: int = 5) -> Truth:
     points = _points(z, views["left"])
     eye = np.array([geometry.baseline_m, 0.0, 0.0])
     disparity = (geometry.focal_px * geometry.baseline_m / z - geometry.doffs_px).astype(np.float32)
-    in_left = _on_sensor(points @ geometry.left.rectified_from_camera, rig.left)
-    in_right = _on_sensor((points - eye) @ geometry.right.rectified_from_camera, rig.right)
+    in_left = on_sensor(points @ geometry.left.rectified_from_camera, rig.left)
+    in_right = on_sensor((points - eye) @ geometry.right.rectified_from_camera, rig.right)
     column = np.arange(geometry.size[1]) - disparity
     valid = in_left & in_right & (column >= 0) & (column <= geometry.size[1] - 1)
     return Truth(
@@ -94,9 +94,12 @@ def _points(z: Float32, view: Pinhole) -> Float64:
     return np.stack([x, y, z.astype(np.float64)], axis=-1)
 
 
-def _on_sensor(points: Float64, camera: PlenopticCamera) -> Bool:
-    """Return which points ``(..., 3)`` in camera axes fall on the camera's sensor."""
-    x = camera.focal_px[0] * points[..., 0] / points[..., 2] + camera.principal_px[0]
-    y = camera.focal_px[1] * points[..., 1] / points[..., 2] + camera.principal_px[1]
-    inside: Bool = (x >= 0) & (x <= camera.sensor_px[0] - 1) & (y >= 0) & (y <= camera.sensor_px[1] - 1)
+def on_sensor(points: Float64, camera: PlenopticCamera, margin_px: float = 0.0) -> Bool:
+    """Return which points ``(..., 3)`` in camera axes fall on the camera's sensor, at least a margin from its edge."""
+    x, y = points[..., 0] / points[..., 2], points[..., 1] / points[..., 2]
+    gain = 1 + camera.distortion[0] * (x * x + y * y)
+    x = camera.focal_px[0] * x * gain + camera.principal_px[0] - margin_px
+    y = camera.focal_px[1] * y * gain + camera.principal_px[1] - margin_px
+    width, height = (n - 1 - 2 * margin_px for n in camera.sensor_px)
+    inside: Bool = (x >= 0) & (x <= width) & (y >= 0) & (y <= height)
     return inside

@@ -54,3 +54,8 @@ def test_first_square_is_black(rig: SimulatedRig, options: SimulateOptions) -> N
 def test_board_that_does_not_fit_is_refused(rig: SimulatedRig, options: SimulateOptions) -> None:
     with pytest.raises(ConfigError, match=r"5 x 4 corners, 50 mm apart, does not fit .* smaller board_square_m"):
         draw_poses(replace(options, boards=1, board_corners=(5, 4), board_square_m=0.05), rig)
+
+
+def test_board_that_looks_the_same_upside_down_is_refused(rig: SimulatedRig, options: SimulateOptions) -> None:
+    with pytest.raises(ConfigError, match=r"corners = 5 x 3, expected one number odd and one even"):
+        draw_poses(replace(options, boards=1, board_corners=(5, 3)), rig)

@@ -108,6 +108,6 @@ def test_rig_sees_the_crossing_of_its_axes(rig: SimulatedRig, options: SimulateO
 def test_rig_file_describes_the_cameras(rig: SimulatedRig) -> None:
     assert rig.stereo.left.focal_px[0] == rig.left.focal_px
     assert rig.stereo.right.pupil_m_per_px == rig.right.pupil_m_per_px
-    assert rig.stereo.pixel_px == pytest.approx(12.395, abs=0.002)
+    assert rig.stereo.pixel_px == pytest.approx(12.372, abs=0.001)
     full = build_rig(SimulateOptions())
     assert full.left.sensor_px == (7728, 5368)

@@ -38,7 +38,7 @@ def test_layout(folder: Path) -> None:
         names -= {f"whites/{serial}/{name}" for name in ("MOD_0015.RAW", "MOD_0015.TXT", "HOTPIXEL.BIN")}
     truth = ("disparity.pfm", "depth.tiff", "valid.png", "occlusion.png", "centre_left.png", "centre_right.png")
     names -= {f"truth/{name}" for name in truth}
-    names -= {"boards/00_left.LFR", "boards/00_right.LFR", "boards/poses.toml"}
+    names -= {"boards/00_left.LFR", "boards/00_right.LFR", "boards/poses.toml", "boards/target.toml"}
     assert names == {"left.LFR", "right.LFR", "rig.toml", "simulation.toml"}
 
 
@@ -101,7 +101,7 @@ def test_existing_folder_is_kept(folder: Path) -> None:
         ({"samples": 5000}, "samples = 5000, expected at most 1024"),
         ({"boards": 100}, "boards = 100, expected at most 99"),
         ({"read_noise_dn": -1.0}, "read_noise_dn = -1.0, expected zero or more"),
-        ({"board_corners": (1, 4)}, "board_corners = .* expected at least 2"),
+        ({"distortion_k1": 0.7}, "distortion_k1 = 0.7, expected -0.5 to 0.5"),
         ({"board_square_m": 0.0}, "board_square_m = 0.0, expected a positive number"),
         ({"sensor": "huge"}, "sensor = 'huge'"),
     ],

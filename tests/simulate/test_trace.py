@@ -35,8 +35,9 @@ def dot(point: tuple[float, float, float], size: float) -> Scene:
 
 def lenslets(camera: SimulatedCamera, margin_px: float) -> np.ndarray:
     """Micro-image centres at least a margin inside the sensor, ``(N, 2)`` px."""
-    i, j = np.mgrid[-60:60, -60:60]
     lattice = camera.lattice()
+    column, row = np.linalg.solve(lattice[1:].T, np.asarray(camera.sensor_px) / 2 - lattice[0]).round()
+    i, j = np.mgrid[row - 40 : row + 40, column - 40 : column + 40]
     centres = lattice[0] + (j + 0.5 * (i % 2))[..., None] * lattice[1] + i[..., None] * lattice[2]
     centres = centres.reshape(-1, 2)
     inside = np.all((centres > margin_px) & (centres < np.array(camera.sensor_px) - 1 - margin_px), axis=1)
@@ -101,6 +102,20 @@ def test_right_camera_sees_a_point_where_the_rig_says(rig: SimulatedRig) -> None
     scene = scene.seen_from(rig.stereo.right_from_left, np.asarray(rig.stereo.translation_m))
     centre = dot_centres(camera, scene, np.zeros((1, 2)))[0]
     assert np.abs(centre - 250.0).max() < 0.1
+
+
+@pytest.mark.parametrize("k1", [-0.3, 0.3])
+def test_distortion_moves_points_along_the_radius(rig: SimulatedRig, k1: float) -> None:
+    direction = np.array([0.20, -0.12])
+    bent = direction * (1 + k1 * direction @ direction)
+    principal = 200.0 - bent * rig.left.focal_px
+    camera = replace(
+        rig.left, sensor_px=(400, 400), principal_px=(principal[0], principal[1]), distortion_k1=k1, f_number=4.0
+    )
+    scene = dot((0.85 * direction[0], 0.85 * direction[1], 0.85), 0.002)
+    centre = dot_centres(camera, scene, np.zeros((1, 2)))[0]
+    assert np.abs(centre - 200.0).max() < 0.3
+    assert camera.plenoptic().distortion == (k1, 0.0, 0.0, 0.0, 0.0)
 
 
 def test_every_bayer_site_weighs_colours_by_its_own_filter(camera: SimulatedCamera) -> None:
