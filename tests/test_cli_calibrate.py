@@ -134,6 +134,12 @@ def test_refuses_shots_of_several_cameras(photographs: Path) -> None:
         see_targets([("a", left[0], left[1]), ("b", right[1], right[0])], TARGET, None)
 
 
+def test_refuses_two_sides_of_one_camera(photographs: Path) -> None:
+    paths = [path for _, path, _ in pair_shots(photographs / "left", photographs / "right")]
+    with pytest.raises(AssetError, match=r"shot a: .*00\.h5 and .*01\.h5 were both taken by camera L"):
+        see_targets([("a", paths[0], paths[1])], TARGET, None)
+
+
 def capture(zoom: int) -> types.SimpleNamespace:
     lens = types.SimpleNamespace(zoom_step=zoom, focus_step=5)
     return types.SimpleNamespace(metadata=types.SimpleNamespace(serial="A", height=4, width=6, lens=lens))
@@ -158,6 +164,12 @@ def test_pairs_by_name_with_the_side_taken_out(tmp_path: Path) -> None:
     assert [pair[1:] for pair in found] == [("00_left.LFR", "00_right.LFR"), ("01_left.LFR", "01_right.LFR")]
     (tmp_path / "01_right.LFR").unlink()
     with pytest.raises(AssetError, match=r"01_left\.LFR: found no partner"):
+        pair_shots(tmp_path, tmp_path)
+
+
+def test_a_capture_is_not_its_own_partner(tmp_path: Path) -> None:
+    (tmp_path / "IMG_1.LFR").touch()
+    with pytest.raises(AssetError, match=r"IMG_1\.LFR: found in the left and in the right"):
         pair_shots(tmp_path, tmp_path)
 
 

@@ -57,7 +57,8 @@ def see_targets(
     Raises
     ------
     AssetError
-        If raw captures come without white images, or one side's shots differ in camera, zoom, focus or size.
+        If raw captures come without white images, one side's shots differ in camera, zoom, focus or size, or both
+        sides' were taken by one camera.
     TargetNotFoundError
         If no shot shows the target to both cameras.
     """
@@ -75,6 +76,7 @@ def see_targets(
             del light_field
             progress(2 * done + number + 1, 2 * len(shots))
         if len(seen) == 2:
+            _refuse_one_camera(name, seen)
             pairs.append(ShotPair(name, seen[0], seen[1]))
     if not pairs:
         raise TargetNotFoundError(
@@ -83,6 +85,15 @@ def see_targets(
             else "found no shots, expected photographs of the target by both cameras"
         )
     return Session(tuple(pairs), (sides[0].size_px, sides[1].size_px), sides[0].pixel_px, tuple(unusable))
+
+
+def _refuse_one_camera(name: str, seen: Sequence[Sightings]) -> None:
+    left, right = seen
+    if left.serial and left.serial == right.serial:
+        raise AssetError(
+            f"shot {name}: {left.source} and {right.source} were both taken by camera {left.serial}, expected two "
+            "cameras; give each camera's photographs as one side"
+        )
 
 
 @dataclass(slots=True)

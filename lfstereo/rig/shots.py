@@ -20,9 +20,15 @@ def pair_shots(left: Path, right: Path) -> list[tuple[str, Path, Path]]:
     Raises
     ------
     AssetError
-        If a folder is missing or holds no captures, or a capture has no partner.
+        If a folder is missing or holds no captures, or a capture has no partner, or would be its own.
     """
     found = [_captures(left, "left"), _captures(right, "right")]
+    both = sorted(set(found[0]) & set(found[1]))
+    if both:
+        raise AssetError(
+            f"{both[0]}: found in the left and in the right camera's photographs, expected each in one; put 'left' and "
+            "'right' into the names, or give two folders"
+        )
     named = [{_SIDE.sub("", path.stem): path for path in side} for side in found]
     if not named[0].keys() & named[1].keys() and len(found[0]) == len(found[1]):
         return [(a.stem, a, b) for a, b in zip(*found, strict=True)]

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
+import json
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -112,6 +114,20 @@ def test_merged_views_keep_the_paths_of_the_corners() -> None:
     corner, place = merged.centre_view()
     np.testing.assert_allclose(place, expected_px(CHECKERBOARD, TURN)[corner], atol=2 * PLACE_TOLERANCE_PX)
     assert usable(merged)
+
+
+def test_real_checkerboards_of_a_first_generation_camera(real_data: Path) -> None:
+    folder = real_data / "raw/jaramillo_f01/CalSamples"
+    published = json.loads((folder / "CalInfo.json").read_text())["EstCamIntrinsicsH"]
+    target = Target("checkerboard", (22, 19), 0.004)
+    pictures = [cv2.imread(str(path), cv2.IMREAD_GRAYSCALE) for path in sorted(folder.glob("raw?*__Decoded_Thumb.png"))]
+    assert len(pictures) == 9
+    places = [find_board(picture, target, "thumb")[1].astype(np.float32) for picture in pictures]
+    points = [target.points.astype(np.float32)] * len(places)
+    rms, matrix, *_ = cv2.calibrateCamera(points, places, (379, 379), None, None)
+    assert rms < 0.2  # px
+    for axis in (0, 1):  # the published camera also uses the other views
+        assert matrix[axis, axis] == pytest.approx(1 / published[axis + 2][axis + 2], rel=0.03)
 
 
 def test_says_that_there_is_no_board() -> None:
