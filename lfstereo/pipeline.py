@@ -28,7 +28,6 @@ from lfstereo.rig.rectify import (
     rectified_geometry,
     rectify,
     view_baseline_m,
-    view_homography,
 )
 from lfstereo.rig.rig import StereoRig
 
@@ -146,8 +145,7 @@ def focus_side(
     """Rectify one light field and render its focal stack at the pair's common disparities."""
     camera = rig.left if side == "left" else rig.right
     t0, s0 = light_field.centre
-    homography = view_homography(light_field, camera, geometry, side, t0, s0)
-    seen = field_of_view(light_field.views.shape[2:4], homography, geometry.size)
+    seen = field_of_view(light_field, camera, geometry, side)
     step_m = view_baseline_m(light_field, camera)
     views_across = max(light_field.views.shape[:2])
     with clock.stage(f"rectify {side}") as progress:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, TypeVar
 
 import cv2
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from lfstereo.arrays import Bool, Float32, Float64
+from lfstereo.arrays import Bool, Float32, Float64, UInt8
 from lfstereo.conventions import DISPARITY_RANGE_PX
 from lfstereo.errors import AssetError, RigError, ShapeError
 from lfstereo.lightfield.field import LightField, ViewSampling
@@ -19,6 +19,7 @@ from lfstereo.rig.distortion import distort
 from lfstereo.rig.rig import PlenopticCamera, StereoRig
 
 Side = Literal["left", "right"]
+Picture = TypeVar("Picture", Float32, UInt8)
 _MAX_TURN_RAD = math.radians(30.0)
 _VIEW_PIXELS = ViewSampling(origin_px=(0.0, 0.0), step_px=(1.0, 1.0), rotation_rad=0.0, view_step_px=1.0)
 
@@ -165,15 +166,9 @@ def rectify(
         t, s = divmod(index, s_count)
         view = light_field.views[t, s]
         confidence = full if light_field.weight is None else light_field.weight[t, s]
-        if any(camera.distortion[:3]):
-            x, y = view_map(light_field, camera, geometry, side, t, s)
-            views[t, s] = cv2.remap(view, x, y, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
-            weight[t, s] = cv2.remap(confidence, x, y, cv2.INTER_LINEAR)
-        else:
-            source, size = view_homography(light_field, camera, geometry, side, t, s), geometry.size[::-1]
-            cubic, linear = (n | cv2.WARP_INVERSE_MAP for n in (cv2.INTER_CUBIC, cv2.INTER_LINEAR))
-            views[t, s] = cv2.warpPerspective(view, source, size, flags=cubic, borderMode=cv2.BORDER_REPLICATE)
-            weight[t, s] = cv2.warpPerspective(confidence, source, size, flags=linear)
+        where = (light_field, camera, geometry, side, t, s)
+        views[t, s] = _resampled(view, *where, cv2.INTER_CUBIC)
+        weight[t, s] = _resampled(confidence, *where, cv2.INTER_LINEAR)
         progress(index + 1, t_count * s_count)
     np.maximum(views, 0.0, out=views)
     return LightField(views=views, weight=weight, sampling=None, serial=light_field.serial, source=light_field.source)
@@ -256,17 +251,35 @@ def _sensor_from_direction(camera: PlenopticCamera, pupil: Float64) -> Float64:
     )
 
 
-def field_of_view(light_field_shape: tuple[int, int], homography: Float64, size: tuple[int, int]) -> Bool:
-    """Return where a rectified view ``(V, U)`` was seen by the camera at all."""
-    rows, columns = size
-    seen = cv2.warpPerspective(
-        np.full(light_field_shape, 255, np.uint8),
-        homography,
-        (columns, rows),
-        flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
-    )
-    mask: Bool = seen == 255
+def field_of_view(light_field: LightField, camera: PlenopticCamera, geometry: RectifiedGeometry, side: Side) -> Bool:
+    """Return where the rectified centre view ``(V, U)`` was seen by the camera at all."""
+    t0, s0 = light_field.centre
+    whole = np.full(light_field.views.shape[2:4], 255, np.uint8)
+    mask: Bool = _resampled(whole, light_field, camera, geometry, side, t0, s0, cv2.INTER_LINEAR) == 255
     return mask
+
+
+def _resampled(
+    picture: Picture,
+    light_field: LightField,
+    camera: PlenopticCamera,
+    geometry: RectifiedGeometry,
+    side: Side,
+    t: int,
+    s: int,
+    interpolation: int,
+) -> Picture:
+    """Return a picture of decoded view ``(t, s)`` in rectified px; zero beyond the captured field, or its border."""
+    border = cv2.BORDER_CONSTANT if interpolation == cv2.INTER_LINEAR else cv2.BORDER_REPLICATE
+    result: Picture
+    if any(camera.distortion[:3]):
+        x, y = view_map(light_field, camera, geometry, side, t, s)
+        result = cv2.remap(picture, x, y, interpolation, borderMode=border)
+    else:
+        source = view_homography(light_field, camera, geometry, side, t, s)
+        flags = interpolation | cv2.WARP_INVERSE_MAP
+        result = cv2.warpPerspective(picture, source, geometry.size[::-1], flags=flags, borderMode=border)
+    return result
 
 
 def _view_from_sensor(light_field: LightField) -> Float64:

@@ -11,7 +11,7 @@ import pytest
 from lfstereo.errors import ConfigError
 from lfstereo.lightfield.field import LightField, ViewSampling
 from lfstereo.rig.intrinsics import plenoptic_rays, project
-from lfstereo.rig.rectify import rectified_geometry, rectify, view_baseline_m, view_homography, view_map
+from lfstereo.rig.rectify import field_of_view, rectified_geometry, rectify, view_baseline_m, view_homography, view_map
 from lfstereo.rig.rig import PlenopticCamera, StereoRig, read_rig, write_rig
 
 BEND = (-0.3, 0.4, 0.1, 0.01, -0.02)
@@ -60,6 +60,7 @@ def test_rectify_follows_the_map() -> None:
     assert inside.mean() > 0.5
     np.testing.assert_allclose(found.views[1, 2, inside, 0], x[inside], atol=0.1)
     np.testing.assert_allclose(found.views[1, 2, inside, 1], y[inside], atol=0.1)
+    np.testing.assert_array_equal(field_of_view(field, LEFT, geometry, "left"), found.weight[1, 1] == 255)  # type: ignore[index]
 
 
 def test_without_distortion_the_map_is_the_homography() -> None:
