@@ -17,6 +17,9 @@ from lfstereo.simulate.scene import Scene, Surface, primitive, room_light, with_
 
 _REFERENCE_VIEW = 0.2636
 """Half width of the view at 1 m for which the props' sizes are meant: a full sensor at f = 20 mm."""
+_REFERENCE_DEPTH_M = 0.8
+_REFERENCE_RANGE_M = 0.6
+"""Mid-range and length of the range for which they are meant: 0.6 to 1.2 m."""
 _CROOKED = 0.006
 """Slope by which the views of a crooked rig may reach beyond those of a straight one."""
 
@@ -63,6 +66,9 @@ class _Table:
     def __init__(self, options: SimulateOptions, across: float, down: float) -> None:
         self.near, self.far = options.near_m, options.far_m
         self.across, self.down, self.unit = across, down, across / _REFERENCE_VIEW
+        middle = 2 / (1 / self.near + 1 / self.far)
+        # As large as the view at mid-range allows, but never thicker than the working range does.
+        self.size = min(self.unit * middle / _REFERENCE_DEPTH_M, (self.far - self.near) / _REFERENCE_RANGE_M)
         self.baseline = options.baseline_m
         self.front = np.array([0.0, (1.04 * down + _CROOKED) * self.near, self.near])
         self.back = np.array([0.0, 0.30 * down * self.far, self.far])
@@ -87,11 +93,11 @@ class _Table:
         z = self.near + depth * (self.far - self.near)
         share = (z - self.near) / (self.far - self.near)
         foot = self.front + share * (self.back - self.front) + [x * self.across * z, 0.0, 0.0]
-        return Stand(foot, self.axes, size * self.unit)
+        return Stand(foot, self.axes, size * self.size)
 
     def hanging(self, x: float, depth: float, drop: float, size: float) -> Stand:
         z = self.near + depth * (self.far - self.near)
-        return Stand(np.array([x * self.across * z, -self.down * z * drop, z]), np.eye(3), size * self.unit)
+        return Stand(np.array([x * self.across * z, -self.down * z * drop, z]), np.eye(3), size * self.size)
 
 
 def _wall(options: SimulateOptions, across: float, down: float, rng: np.random.Generator) -> Float64:

@@ -82,6 +82,17 @@ def test_room_fills_the_view_inside_the_working_range(sensor: str, seed: int) ->
         assert 0.01 < truth.occluded.mean() < 0.2
 
 
+@pytest.mark.parametrize(
+    "values", [{"focal_length_m": 0.0095}, {"near_m": 0.8, "far_m": 1.0}, {"near_m": 1.0, "far_m": 3.0, "focus_m": 1.6}]
+)
+def test_room_fits_other_lenses_and_ranges(values: dict[str, float]) -> None:
+    options = SimulateOptions(**values)  # type: ignore[arg-type]
+    rig = build_rig(options)
+    truth = true_maps(room(options, rig), rig.stereo, 1)
+    assert options.near_m < truth.depth_m.min()
+    assert truth.depth_m.max() < options.far_m
+
+
 def test_room_follows_the_seed(rig: SimulatedRig) -> None:
     same = [room(SimulateOptions(sensor="small", seed=5), rig) for _ in range(2)]
     np.testing.assert_array_equal(same[0].primitives, same[1].primitives)
