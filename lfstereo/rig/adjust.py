@@ -136,11 +136,6 @@ def adjust(
     start
         Where to begin.
 
-    Raises
-    ------
-    RigError
-        If the unknowns cannot be told apart, or no step improves on a start that explains nothing.
-
     References
     ----------
     Triggs, McLauchlan, Hartley and Fitzgibbon, "Bundle adjustment - a modern synthesis" (2000); Huber, "Robust

@@ -17,7 +17,9 @@ from lfstereo.rig.bundle import RigOptions, RigSolution, ShotPair, solve_rig
 from lfstereo.rig.intrinsics import plenoptic_rays, project
 from lfstereo.rig.rig import PlenopticCamera, StereoRig, read_rig, write_rig
 from lfstereo.rig.sightings import Sightings
+from lfstereo.rig.start import start_poses, start_pupil
 from lfstereo.rig.target import Target
+from lfstereo.rig.trust import check_baseline
 
 TARGET = Target("checkerboard", (13, 8), 0.020)
 LEFT = PlenopticCamera("L", (7728, 5368), (14657.0, 14660.0), (3880.0, 2667.0), 0.85, 7.47e-4)
@@ -143,6 +145,34 @@ def test_refuses_boards_in_one_part_of_the_frame_unless_told_otherwise() -> None
     with pytest.raises(RigError, match="frame's width, expected 40% or more; photograph the board near the left"):
         solved(pairs)
     assert solved(pairs, RigOptions(any_set=True)).rig.baseline_m > 0
+
+
+def test_refuses_an_uncertain_baseline() -> None:
+    with pytest.raises(RigError, match=r"baseline is 95\.0 mm with a standard deviation of 3\.00 mm, expected 2%"):
+        check_baseline(0.095, 0.003)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"offset": 0.0}, "each shot has one view only"),
+        ({"place": -1.0}, "do not move between the views"),
+    ],
+)
+def test_refuses_views_that_do_not_tell_depth(change: dict, message: str) -> None:
+    _, pairs = simulated(0, False)
+    lefts = [pair.left for pair in pairs[:3]]
+    lefts = [dataclasses.replace(s, **{name: getattr(s, name) * by for name, by in change.items()}) for s in lefts]
+    depths = [np.full(len(TARGET.points), z) for z in (0.9, 0.6, 1.1)]
+    with pytest.raises(RigError, match=message):
+        start_pupil(lefts, depths, 14660.0)
+
+
+def test_refuses_corners_that_no_board_explains() -> None:
+    _, pairs = simulated(0, False)
+    nowhere = dataclasses.replace(pairs[0].left, place=pairs[0].left.place * np.nan)
+    with pytest.raises(RigError, match=r"00_left: no pose of the board explains its corners; drop this shot"):
+        start_poses(nowhere, TARGET.points, 14660.0, np.zeros(2))
 
 
 def test_ordinary_stereo_pairs_agree_with_the_published_rig(real_data: Path) -> None:
