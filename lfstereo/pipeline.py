@@ -89,9 +89,10 @@ def run_pair(
     """
     from lfstereo.network.estimate import estimate_disparity, load_network
 
-    if options.slices < 2:
-        raise ConfigError(f"slices = {options.slices}, expected at least 2")
     network = load_network(options.model, options.device)
+    wanted = network.module.architecture.slices
+    if options.slices != wanted:
+        raise ConfigError(f"slices = {options.slices}, expected {wanted}, what {options.model} was made for")
     geometry = rectified_geometry(rig)
     sides: dict[Side, SideResult] = {}
     shape: tuple[int, ...] | None = None

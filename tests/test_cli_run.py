@@ -18,6 +18,7 @@ from lfstereo.depth import pictures
 from lfstereo.depth.pfm import read_pfm
 from lfstereo.depth.ply import read_ply
 from lfstereo.depth.png16 import read_disparity_png
+from lfstereo.rig.rig import PlenopticCamera, StereoRig, write_rig
 
 RESULT_FILES = {
     "all_in_focus.png",
@@ -111,6 +112,34 @@ def test_json_summary_of_decoded_light_fields_is_the_same_map(
     found, found_known = read_pfm(out / "disparity.pfm")
     both = known & found_known
     assert float(np.median(np.abs(found - expected)[both])) < 0.1
+
+
+def test_folders_of_views(pair: Path, tmp_path: Path) -> None:
+    """Views of a parallel pair of cameras, 12 px apart: nothing but the rig file says so."""
+    scene = np.random.default_rng(3).random((96, 160, 3), dtype=np.float32)
+    scene = cv2.GaussianBlur(scene, None, 1.0)
+    scene = np.clip((scene - scene.mean()) * 3 + 0.5, 0, 1)
+    for side, shift in (("left", 0), ("right", -12)):
+        folder = tmp_path / side
+        folder.mkdir()
+        for s in range(3):
+            picture = np.roll(scene, shift - (s - 1), axis=1)
+            cv2.imwrite(str(folder / f"view_00_{s:02d}.png"), np.rint(picture * 255).astype(np.uint8))
+    rig = StereoRig(*[parallel_camera()] * 2, (0.0, 0.0, 0.0), (-0.12, 0.0, 0.0), 0.8, 12.0, 1.0)
+    write_rig(tmp_path / "rig.toml", rig)
+    out = tmp_path / "out"
+    arguments = words(pair, out, left=tmp_path / "left", right=tmp_path / "right")
+    arguments[arguments.index("--rig") + 1] = str(tmp_path / "rig.toml")
+    assert main(arguments) == 0
+    disparity, known = read_pfm(out / "disparity.pfm")
+    assert known.mean() > 0.5
+    # f B / z = 12 px at 1 m per 100 px of focal length; the far end of the range is taken off.
+    assert float(np.median(disparity[known])) == pytest.approx(12 - 1, abs=1.0)
+
+
+def parallel_camera() -> PlenopticCamera:
+    """Views that move by 1 px per 0.01 m for a wall at 1 m, focused at infinity."""
+    return PlenopticCamera("", (160, 96), (100.0, 100.0), (79.5, 47.5), 1e6, 0.01)
 
 
 def test_refuses_an_existing_output(pair: Path, result: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -216,7 +245,7 @@ def test_bad_options(pair: Path, tmp_path: Path, capsys: pytest.CaptureFixture[s
     config = tmp_path / "run.toml"
     config.write_text("[run]\nslcies = 3\n")
     assert "'slcies' is not an option" in refused(capsys, words(pair, tmp_path / "out", "--config", str(config)))
-    assert "slices = 1" in refused(capsys, words(pair, tmp_path / "out", "--slices", "1"))
+    assert "slices = 1, expected 16" in refused(capsys, words(pair, tmp_path / "out", "--slices", "1"))
     assert "nosuch" in refused(capsys, words(pair, tmp_path / "out", "--model", "nosuch"))
 
 
