@@ -21,10 +21,13 @@ from lfstereo.conventions import DISPARITY_RANGE_PX, SLICES_DEFAULT
 from lfstereo.network.blocks import ConvBlock, initialise
 from lfstereo.network.edof_net import EdofNet
 from lfstereo.network.focus_net import FocusNet, PlainStack
-from lfstereo.network.stereo_net import Prediction, StereoNet
-from lfstereo.network.volume import likeness, warp_right
+from lfstereo.network.stereo_net import BIN_PX, BINS, Prediction, StereoNet
+from lfstereo.network.volume import likeness, resample_bins, warp_right
 from lfstereo.network.volume_net import FocusVolumeNet
 from lfstereo.options import option
+
+FOCUS_FLOOR = 0.03
+"""Probability added to every slice before focus weighs the stereo bins: focus may be wrong."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,11 +101,13 @@ class BdffNet(nn.Module):
         by_focus = self.focus(left)
         focus = to_range(by_focus.final, range_px)
         guided = self.guided(focus, edof_left - 0.5)
-        stereo = self.stereo(edof_left, edof_right)
+        prior = focus_prior(by_focus, range_px) if self.architecture.fusion_guide else None
+        stereo = self.stereo(edof_left, edof_right, prior)
         if self.architecture.fusion_guide:
-            support = _support(edof_left, edof_right, stereo.final)
+            joint = stereo.final if stereo.joint is None else stereo.joint
+            support = _support(edof_left, edof_right, joint)
             trust = torch.cat((support, _sureness(stereo, support), _sureness(by_focus, support)), dim=1)
-            fused = self.fusion(stereo.final, guided, edof_left - 0.5, trust)
+            fused = self.fusion(joint, guided, edof_left - 0.5, trust)
         else:
             fused = self.fusion(stereo.final, guided)
         return PairPrediction(edof_left, focus, guided, stereo, fused)
@@ -113,7 +118,8 @@ class Blend(nn.Module):
 
     The published fusion maps two disparity maps to one. Here the convolutions also see the left sharp image and, per
     pixel, how well the stereo match explains the image and how sure either cue is, and they return a weight and a
-    correction; untrained, the answer is nearly the stereo map.
+    correction; untrained, the answer is nearly the map that comes in. That map is Stereo-Net's, read from its bins
+    after the focus volume has weighed them (:func:`focus_prior`).
     """
 
     def __init__(self, width: int) -> None:
@@ -129,6 +135,21 @@ class Blend(nn.Module):
         share = torch.sigmoid(weight - 3.0)
         joined: Tensor = (1 - share) * stereo + share * guided + 0.1 * correction
         return joined
+
+
+def focus_prior(by_focus: Prediction, range_px: tuple[float, float]) -> Tensor | None:
+    """Log-probability of every stereo bin as focus sees it: two independent cues multiply.
+
+    Returns
+    -------
+    Tensor
+        ``(B, 27, H / 4, W / 4)``; ``None`` for a focus network without bins.
+    """
+    if not by_focus.logits:
+        return None
+    share = F.softmax(by_focus.logits[-1], dim=1)
+    bins = torch.arange(BINS, device=share.device, dtype=share.dtype) * BIN_PX
+    return torch.log(resample_bins(share, range_px[1], range_px[0], bins) + FOCUS_FLOOR)
 
 
 @torch.no_grad()

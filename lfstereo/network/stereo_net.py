@@ -60,6 +60,8 @@ class Prediction:
     """Disparity / 100 px, ``(B, 1, H, W)`` each, from the first stage to the final one."""
     logits: tuple[Tensor, ...] = ()
     """Scores of the disparity bins, ``(B, bins, H / 4, W / 4)`` each; empty for networks without bins."""
+    joint: Tensor | None = None
+    """The final map once more, with the prior; ``None`` where no prior was given or the network has no bins."""
 
     @property
     def final(self) -> Tensor:
@@ -85,9 +87,18 @@ class StereoNet(nn.Module):
         if isinstance(self.body, _Correlated):
             self.body.start_from_likeness()
 
-    def forward(self, left: Tensor, right: Tensor) -> Prediction:
-        """Return the predictions of every stage."""
-        out: Prediction = self.body(left - 0.5, right - 0.5)
+    def forward(self, left: Tensor, right: Tensor, prior: Tensor | None = None) -> Prediction:
+        """Return the predictions of every stage.
+
+        Parameters
+        ----------
+        left, right
+            ``(B, 3, H, W)``.
+        prior
+            ``(B, 27, H / 4, W / 4)`` log-probabilities of the bins from another cue, added to the scores of stereo for
+            the map :attr:`Prediction.joint` alone.
+        """
+        out: Prediction = self.body(left - 0.5, right - 0.5, prior)
         return out
 
 
@@ -106,7 +117,8 @@ class _Concatenated(nn.Module):
         self.back_features = nn.Conv2d(channels, channels, 1)
         self.back_map = nn.Conv2d(1, channels, 2, 2)
 
-    def forward(self, left: Tensor, right: Tensor) -> Prediction:
+    def forward(self, left: Tensor, right: Tensor, prior: Tensor | None = None) -> Prediction:
+        del prior  # this variant has no bins
         x = self.stem(torch.cat((left, right), dim=1))
         features = self.glasses[0](x)
         first = self.heads[0](features)
@@ -203,7 +215,7 @@ class _Correlated(nn.Module):
         with torch.no_grad():
             score[0, GROUPS:, 1, 1, 1] = 3.0
 
-    def forward(self, left: Tensor, right: Tensor) -> Prediction:
+    def forward(self, left: Tensor, right: Tensor, prior: Tensor | None = None) -> Prediction:
         batch = left.shape[0]
         images = torch.cat((left, right))
         half, quarter = self.features(images)
@@ -212,7 +224,8 @@ class _Correlated(nn.Module):
         volume = torch.cat((learned, likeness_volume(images[:batch], images[batch:], BINS, DILATIONS)), dim=1)
         logits, context = self.aggregate(volume, quarter[:batch])
         coarse = [soft_argmax(scores, self.bin_values) for scores in logits]
-        sharpest = mode_mean(logits[-1], self.bin_values)
-        final = self.refine(sharpest, context, half[:batch], half[batch:], images)
+        around = (context, half[:batch], half[batch:], images)
+        final = self.refine(mode_mean(logits[-1], self.bin_values), *around)
+        joint = None if prior is None else self.refine(mode_mean(logits[-1] + prior, self.bin_values), *around)
         full = [F.interpolate(m, scale_factor=4, mode="bilinear", align_corners=False) for m in coarse]
-        return Prediction((*full, final), tuple(logits))
+        return Prediction((*full, final), tuple(logits), joint)

@@ -181,6 +181,36 @@ def mode_mean(logits: Tensor, values: Tensor, reach: int = 2) -> Tensor:
     return (share * values.view(1, -1, 1, 1)).sum(1, keepdim=True) / share.sum(1, keepdim=True)
 
 
+def resample_bins(share: Tensor, near: float, far: float, values: Tensor) -> Tensor:
+    """Interpolate probabilities over evenly spaced slices at other disparities.
+
+    Parameters
+    ----------
+    share
+        ``(B, K, h, w)`` for slices from ``near`` to ``far``.
+    near, far
+        Disparity of the first and of the last slice.
+    values
+        ``(bins,)`` where the answer is wanted, same unit; beyond the slices the end slice's value holds.
+
+    Returns
+    -------
+    Tensor
+        ``(B, bins, h, w)``.
+
+    Examples
+    --------
+    >>> share = torch.tensor([0.8, 0.2]).view(1, 2, 1, 1)
+    >>> resample_bins(share, 10.0, 0.0, torch.tensor([5.0, 12.0])).flatten().tolist()
+    [0.5, 0.800000011920929]
+    """
+    last = share.shape[1] - 1
+    position = ((near - values) / (near - far)).clamp(0, 1) * last
+    lower = position.floor().clamp(max=last - 1).long()
+    upper_share = (position - lower).view(1, -1, 1, 1)
+    return share[:, lower] * (1 - upper_share) + share[:, lower + 1] * upper_share
+
+
 def warp_right(right: Tensor, disparity_px: Tensor) -> Tensor:
     """Fetch ``right`` at ``x - d`` for every left pixel.
 

@@ -66,6 +66,8 @@ def evaluate(network: BdffNet, samples: Sequence[StackSample], progress: Progres
             found = network(left, right)
         wanted, valid = sample.disparity[0], sample.valid[0]
         maps = {"focus": found.focus, "guided": found.guided, "stereo": found.stereo.final, "fused": found.fused}
+        if found.stereo.joint is not None:
+            maps["joint"] = found.stereo.joint
         for part, tensor in maps.items():
             error = np.abs(tensor[0, 0].numpy() * 100 - wanted)
             errors.setdefault(part, []).append(error[valid])

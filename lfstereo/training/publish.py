@@ -30,6 +30,7 @@ DEVIATIONS = (
     "Focus-Net: a focus volume (shared weights per slice, expected slice) in place of four branches over the "
     "concatenated slices, for the same reason",
     "EDoF-Net, Focus-Net-Guided, BDfF-Net: convolutions as published, added to the mean slice or the incoming map",
+    "BDfF-Net multiplies the probabilities that focus and stereo give each disparity before the map is read out",
     "BDfF-Net's ten convolutions also see the left all-in-focus image and how far each cue can be trusted, and return "
     "a weight between stereo and focus and a correction",
 )

@@ -3,14 +3,16 @@
 import pytest
 import torch
 
-from lfstereo.network.bdff_net import Architecture, BdffNet, paper_architecture, to_range
+from lfstereo.network.bdff_net import FOCUS_FLOOR, Architecture, BdffNet, focus_prior, paper_architecture, to_range
 from lfstereo.network.edof_net import RECEPTIVE_FIELD_PX, EdofNet
 from lfstereo.network.focus_net import FocusNet
-from lfstereo.network.stereo_net import BINS, SEARCH_PX, StereoNet, convex_upsample
+from lfstereo.network.stereo_net import BINS, SEARCH_PX, Prediction, StereoNet, convex_upsample
 from lfstereo.network.volume import (
     group_correlation,
     likeness,
     likeness_volume,
+    mode_mean,
+    resample_bins,
     soft_argmax,
     warp_right,
     window_vectors,
@@ -152,3 +154,42 @@ def test_convex_upsample_keeps_a_constant() -> None:
 
 def test_focus_fraction_to_disparity() -> None:
     assert float(to_range(torch.tensor(0.5), (20.0, 60.0))) == pytest.approx(0.4)
+
+
+def test_focus_prior_peaks_at_the_slice_that_focus_chose() -> None:
+    logits = torch.full((1, 16, 2, 2), -20.0)
+    logits[:, 5] = 20.0  # of 16 slices from 100 to 0 px: 66.7 px
+    prior = focus_prior(Prediction((), (logits,)), (0.0, 100.0))
+    assert tuple(prior.shape) == (1, BINS, 2, 2)
+    assert int(prior[0, :, 0, 0].argmax()) == 17  # 68 px, the bin nearest to 66.7
+    assert float(prior.exp().min()) == pytest.approx(FOCUS_FLOOR, rel=1e-3)
+    assert focus_prior(Prediction(()), (0.0, 100.0)) is None
+
+
+def test_prior_decides_between_two_equal_matches() -> None:
+    """On vertical stripes every period is a match; the prior picks the one it knows."""
+    x = torch.arange(256.0)
+    stripes = (0.5 + 0.4 * torch.sin(2 * torch.pi * x / 20)).expand(1, 3, 64, 256)
+    prior = torch.full((1, BINS, 16, 64), -30.0)
+    prior[:, 9:12] = 0.0  # 36 to 44 px
+    torch.manual_seed(0)
+    with torch.inference_mode():
+        found = StereoNet(16).eval()(stripes, stripes, prior)
+    assert abs(100 * float(found.joint[0, 0, 16:-16, 130:-30].median()) - 40.0) < 6.0
+
+
+def test_resample_bins_keeps_a_certain_slice() -> None:
+    share = torch.tensor([0.0, 1.0, 0.0]).view(1, 3, 1, 1)
+    assert resample_bins(share, 100.0, 0.0, torch.tensor([50.0, 75.0, 100.0, 104.0])).flatten().tolist() == [
+        1,
+        0.5,
+        0,
+        0,
+    ]
+
+
+def test_mode_mean_does_not_lie_between_two_objects() -> None:
+    logits = torch.full((1, BINS, 1, 1), -20.0)
+    logits[0, 5], logits[0, 20] = 3.0, 2.9
+    assert float(mode_mean(logits, torch.arange(float(BINS)))) == pytest.approx(5.0, abs=1e-3)
+    assert 9 < float(soft_argmax(logits, torch.arange(float(BINS)))) < 16
