@@ -87,9 +87,10 @@ def run_pair(
     QualityError
         If a lenslet grid or the rig's geometry cannot be trusted.
     """
-    from lfstereo.network.estimate import estimate_disparity, load_network
+    with clock.stage("load network"):
+        from lfstereo.network.estimate import estimate_disparity, load_network
 
-    network = load_network(options.model, options.device)
+        network = load_network(options.model, options.device)
     wanted = network.module.architecture.slices
     if options.slices != wanted:
         raise ConfigError(f"slices = {options.slices}, expected {wanted}, what {options.model} was made for")

@@ -251,8 +251,8 @@ def _run_toml(report: Report, result: PairResult, inputs: Inputs, options: RunOp
             name: getattr(report, name)
             for name in ("width", "height", "disparity_px", "depth_m", "valid_share", "points")
         },
-        "seconds": report.seconds,
-        "peak_gib": report.peak_gib,
+        "seconds": {name: round(seconds, 3) for name, seconds in report.seconds.items()},
+        "peak_gib": {name: round(gib, 3) for name, gib in report.peak_gib.items()},
     }
     tables |= {f'error."{name}"': values for name, values in report.errors.items()}
     text = f"[run]\n{to_toml(options)}"

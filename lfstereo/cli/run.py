@@ -52,8 +52,9 @@ def _text(report: Report, output: Path) -> str:
         f"{report.points} points",
         f"valid {report.valid_share:.1%}; {sum(report.seconds.values()):.1f} s in all, "
         f"peak memory {report.peak_memory_gib:.2f} GiB",
-        "  " + ", ".join(f"{name} {seconds:.1f} s" for name, seconds in report.seconds.items()),
+        f"{'stage':<24}{'seconds':>9}{'peak GiB':>10}",
     ]
+    lines += [f"  {name:<22}{s:>9.1f}{report.peak_gib[name]:>10.2f}" for name, s in report.seconds.items()]
     if report.errors:
         lines.append(f"{'error against truth':<24}{'MAE px':>9}{'bad 1':>9}{'bad 2':>9}{'bad 4':>9}{'median z':>10}")
         for name, e in report.errors.items():
