@@ -5,13 +5,14 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
 
 from lfstereo.develop.options import DevelopOptions
 from lfstereo.lenslet.options import GridOptions
-from lfstereo.lightfield.options import DecodeOptions, ViewOptions
-from lfstereo.options import OptionsT, add_arguments, from_arguments, read_toml
+from lfstereo.lightfield.options import DecodeMethod, DecodeOptions, ViewOptions
+from lfstereo.options import OptionsT, add_arguments, from_arguments, from_mapping, read_toml
 from lfstereo.outputs import atomic_file, check_absent
 from lfstereo.progress import StageClock
 
@@ -31,6 +32,10 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--config", type=Path, help="TOML file with options; the command line goes before it")
     parser.add_argument("--force", action="store_true", help="replace an output that exists")
     parser.add_argument("--json", action="store_true", help="print the summary as JSON on stdout")
+    methods = get_args(DecodeMethod)
+    parser.add_argument(
+        "--method", choices=methods, help="how views are read (default: direct); lftoolbox gives MATLAB's numbers"
+    )
     for options in (ViewOptions, GridOptions, DevelopOptions):
         add_arguments(parser, options)
 
@@ -42,17 +47,22 @@ def run(arguments: argparse.Namespace) -> int:
     check_absent(preview, arguments.force)
     options = _options(arguments)
 
-    from lfstereo.lightfield.decoding import calibrate, views_from
+    from lfstereo.lightfield.decoding import calibrate, check_method, views_from
+    from lfstereo.lightfield.lftoolbox import decode_as_lftoolbox
     from lfstereo.lightfield.store import check_suffix, write_light_field
 
     check_suffix(arguments.output)
     clock = StageClock(bars=sys.stderr.isatty() or not arguments.json)
     with clock.stage("read"):
         capture, white = _read(arguments)
+    check_method(options, white)
     with clock.stage("lenslet grid") as progress:
         grid, shading = calibrate(capture, white, options.grid, progress)
     with clock.stage("views") as progress:
-        light_field = views_from(capture, grid, shading, options, progress)
+        if options.method == "lftoolbox" and white is not None:
+            light_field = decode_as_lftoolbox(capture, white, grid, progress)
+        else:
+            light_field = views_from(capture, grid, shading, options, progress)
     with clock.stage("write"):
         write_light_field(arguments.output, light_field, arguments.force)
         _write_preview(preview, light_field, white or capture, grid, arguments.force)
@@ -67,8 +77,13 @@ def _options(arguments: argparse.Namespace) -> DecodeOptions:
     def given(options: type[OptionsT], name: str) -> OptionsT:
         return from_arguments(options, arguments, tables.get(name, {}), f"{arguments.config} [{name}]")
 
-    return DecodeOptions(
-        view=given(ViewOptions, "decode"), grid=given(GridOptions, "grid"), develop=given(DevelopOptions, "develop")
+    in_file = tables.get("decode", {}).pop("method", "direct")
+    named = from_mapping(DecodeOptions, {"method": arguments.method or in_file}, f"{arguments.config} [decode]")
+    return replace(
+        named,
+        view=given(ViewOptions, "decode"),
+        grid=given(GridOptions, "grid"),
+        develop=given(DevelopOptions, "develop"),
     )
 
 

@@ -13,6 +13,7 @@ from lfstereo.lenslet.fit import estimate_grid_from_photograph, fit_grid
 from lfstereo.lenslet.grid import LensletGrid
 from lfstereo.lenslet.options import GridOptions
 from lfstereo.lightfield.field import LightField
+from lfstereo.lightfield.lftoolbox import decode_as_lftoolbox
 from lfstereo.lightfield.options import DecodeOptions, ViewOptions
 from lfstereo.lightfield.resample import sample_views, view_sampling
 from lfstereo.progress import Progress, silent
@@ -54,12 +55,38 @@ def decode(
     GridFitError
         If the white image is none, or no grid can be fitted.
     ConfigError
-        If the number of views or their distance cannot be.
+        If the number of views or their distance cannot be, or the toolbox's method is asked for something it lacks.
     MetadataError
         If the colour matrix cannot be used.
     """
+    check_method(options, white)
     grid, shading = calibrate(capture, white, options.grid, _part(progress, 0, 25))
+    if options.method == "lftoolbox" and white is not None:
+        del shading
+        return decode_as_lftoolbox(capture, white, grid, _part(progress, 25, 100))
     return views_from(capture, grid, shading, options, _part(progress, 25, 100))
+
+
+def check_method(options: DecodeOptions, white: Capture | None) -> None:
+    """Refuse what the toolbox's method cannot do, before any work is done.
+
+    Raises
+    ------
+    AssetError
+        If it has no white image.
+    ConfigError
+        If it is given options of the views or of the development, which it fixes.
+    """
+    if options.method != "lftoolbox":
+        return
+    if white is None:
+        raise AssetError("method lftoolbox: found no white image, expected one; give --whites, or use method direct")
+    for name, given in (("views", options.view), ("development", options.develop)):
+        if given != type(given)():
+            raise ConfigError(
+                f"method lftoolbox: found options of the {name} ({given}), expected none as the method fixes them; "
+                "leave them out, or use method direct"
+            )
 
 
 def views_from(

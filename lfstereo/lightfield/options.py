@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Literal
 
 from lfstereo.develop.options import DevelopOptions
 from lfstereo.lenslet.options import GridOptions
 from lfstereo.options import option
+
+DecodeMethod = Literal["direct", "lftoolbox"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,6 +24,9 @@ class ViewOptions:
 class DecodeOptions:
     """How a raw capture becomes a light field."""
 
+    method: DecodeMethod = option(
+        "direct", "one careful resampling, or the numbers of the Light Field Toolbox for MATLAB"
+    )
     view: ViewOptions = field(default_factory=ViewOptions)
     grid: GridOptions = field(default_factory=GridOptions)
     develop: DevelopOptions = field(default_factory=DevelopOptions)
