@@ -23,7 +23,7 @@ class Training:
     data: str = ""
     device: str = ""
     minutes: float = 0.0
-    """Wall-clock time of all training stages together."""
+    """Training time of all stages together; stages may have run side by side."""
     date: str = ""
     stages: tuple[str, ...] = ()
     """One line per stage: recipe, steps, minutes."""

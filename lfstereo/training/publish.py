@@ -6,6 +6,7 @@ Run ``python -m lfstereo.training.publish stereo=RUN edof=RUN ... -o models/bdff
 from __future__ import annotations
 
 import argparse
+import dataclasses
 import json
 import sys
 from collections.abc import Sequence
@@ -14,9 +15,10 @@ from pathlib import Path
 
 from lfstereo.errors import ConfigError
 from lfstereo.network.bdff_net import Architecture, BdffNet
-from lfstereo.network.card import LICENCE, ModelCard, Training
-from lfstereo.network.weights import save_model
+from lfstereo.network.card import LICENCE, Metric, ModelCard, Training
+from lfstereo.network.weights import load_model, save_model
 from lfstereo.training.checkpoint import FOLDER, Counters, read_weights
+from lfstereo.training.evaluate import BAD_PX, HELD_OUT_SEED, edof_mae, evaluate, held_out
 from lfstereo.training.stages import PARTS
 
 DATA = (
@@ -87,6 +89,37 @@ def publish(
     return save_model(folder, network, card, force)
 
 
+def measure(folder: Path, count: int, height: int = 192, width: int = 320) -> ModelCard:
+    """Measure a published model on held-out scenes and write the figures into its card.
+
+    Parameters
+    ----------
+    folder
+        The model.
+    count
+        Scenes.
+    height, width
+        Of the scenes, px.
+    """
+    network, card = load_model(folder)
+    samples = held_out(count, height, width, None, HELD_OUT_SEED)
+    command = f"python -m lfstereo.training.evaluate {folder.name} --count {count} --height {height} --width {width}"
+    where = f"{count} rendered scenes of {width} x {height} px with seeds and textures not used in training"
+    metrics: list[Metric] = []
+    for row in evaluate(network, samples):
+        metrics.append(Metric(f"{row.part}: mean absolute disparity error", round(row.mae_px, 2), "px", where, command))
+        if row.part in ("stereo", "fused"):
+            shares = zip(BAD_PX, row.bad, strict=True)
+            metrics.extend(
+                Metric(f"{row.part}: pixels off by more than {limit:.0f} px", round(100 * bad, 1), "%", where, command)
+                for limit, bad in shares
+            )
+    found, plain = edof_mae(network, samples)
+    metrics.append(Metric("edof: mean absolute error of the image", round(found, 4), "of 1.0", where, command))
+    metrics.append(Metric("mean slice, for comparison", round(plain, 4), "of 1.0", where, command))
+    return save_model(folder, network, dataclasses.replace(card, metrics=tuple(metrics)), force=True)
+
+
 def main(words: Sequence[str] | None = None) -> int:
     """Assemble a model from the command line."""
     parser = argparse.ArgumentParser(prog="lfstereo.training.publish", description=__doc__)
@@ -94,10 +127,13 @@ def main(words: Sequence[str] | None = None) -> int:
     parser.add_argument("-o", "--output", type=Path, required=True)
     parser.add_argument("--stages", nargs="*", type=Path, default=[], help="run folders, for the training story")
     parser.add_argument("--device", default="processor")
+    parser.add_argument("--measure", type=int, default=0, metavar="N", help="measure on N held-out scenes for the card")
     parser.add_argument("--force", action="store_true")
     arguments = parser.parse_args(words)
     sources = {part: Path(run) for part, _, run in (text.partition("=") for text in arguments.parts)}
     publish(sources, arguments.output, arguments.stages, arguments.device, arguments.force)
+    if arguments.measure:
+        measure(arguments.output, arguments.measure)
     return 0
 
 

@@ -21,7 +21,7 @@ from lfstereo.training.loop import one_cycle, train
 from lfstereo.training.losses import bin_cross_entropy, image_loss, mean_absolute, staged_loss
 from lfstereo.training.pool import Pool, fill_pool, open_pool
 from lfstereo.training.publish import main as publish_main
-from lfstereo.training.publish import publish
+from lfstereo.training.publish import measure, publish
 from lfstereo.training.recipe import Recipe, read_recipe
 from lfstereo.training.stages import LOSSES, PARTS, TRAINED, select_parts
 
@@ -174,6 +174,10 @@ def test_train_command_then_publish_then_evaluate(tmp_path: Path, capsys: pytest
     assert publish_main([*parts, "-o", str(tmp_path / "tiny-v1"), "--stages", str(tmp_path / "run")]) == 0
     _, card = load_model(tmp_path / "tiny-v1")
     assert card.name == "tiny" and card.training.stages[0].startswith("stereo: 2 steps")
+    before = (tmp_path / "tiny-v1" / "weights.safetensors").read_bytes()
+    measured = measure(tmp_path / "tiny-v1", 1, 64, 64)
+    assert (tmp_path / "tiny-v1" / "weights.safetensors").read_bytes() == before
+    assert any(metric.name.startswith("fused") and "tiny-v1 --count 1" in metric.command for metric in measured.metrics)
     assert evaluate_main([str(tmp_path / "tiny-v1"), "--count", "1", "--height", "64", "--width", "64"]) == 0
     assert "fused_visible" in capsys.readouterr().out
 
