@@ -20,8 +20,13 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "target": ("lfstereo.cli.target", "draw a calibration board to print, and its TOML file"),
     "calibrate": ("lfstereo.cli.calibrate", "photographs of a calibration board by both cameras to a rig"),
     "decode": ("lfstereo.cli.decode", "raw capture to 4-D light field"),
+    "export": ("lfstereo.cli.export", "light field or raw capture to the format of another program"),
     "run": ("lfstereo.cli.run", "two captures to disparity, depth, all-in-focus image and point cloud"),
     "train": ("lfstereo.cli.train", "train a network from a recipe"),
+    "evaluate": (
+        "lfstereo.cli.evaluate",
+        "errors of every network and of classical methods on scenes of known disparity",
+    ),
 }
 """Command name -> module with ``configure(parser)`` and ``run(arguments) -> int``, and its help line."""
 

@@ -92,7 +92,7 @@ def estimate_disparity(
     exposure = exposure_of(left.slices, right.slices)
     height, width = left.slices.shape[1:3]
     multiple = network.module.architecture.multiple
-    inputs = [_to_tensor(encode(stack.slices, exposure), multiple).to(network.device) for stack in (left, right)]
+    inputs = [network_input(encode(stack.slices, exposure), multiple).to(network.device) for stack in (left, right)]
     progress(1, 3)
     far, near = float(left.disparities_px[-1]), float(left.disparities_px[0])
     with torch.inference_mode():
@@ -143,8 +143,8 @@ def check_stacks(left: FocalStack, right: FocalStack, slices: int) -> None:
         )
 
 
-def _to_tensor(display: Float32, multiple: int) -> Tensor:
-    """``(K, V, U, 3)`` to ``(1, K, 3, H, W)``, extended by reflection to the right and below."""
+def network_input(display: Float32, multiple: int) -> Tensor:
+    """Return ``(1, K, 3, H, W)`` of ``(K, V, U, 3)``, extended by reflection to the right and below to multiples."""
     _, height, width, _ = display.shape
     below, beside = -height % multiple, -width % multiple
     padded = np.pad(display, ((0, 0), (0, below), (0, beside), (0, 0)), mode="symmetric")
