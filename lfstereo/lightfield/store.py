@@ -12,7 +12,8 @@ import numpy as np
 from lfstereo.errors import ContainerError
 from lfstereo.lightfield.encoding import from_codes, to_codes
 from lfstereo.lightfield.field import LightField, ViewSampling
-from lfstereo.lightfield.views_folder import read_views_folder
+from lfstereo.lightfield.interchange import eslf, lftoolbox_mat
+from lfstereo.lightfield.interchange.picture_folders import read_picture_folder
 from lfstereo.outputs import atomic_file, check_absent, check_space
 
 SUFFIXES = (".h5", ".hdf5")
@@ -20,11 +21,14 @@ FORMAT_NAME = "lfstereo light field"
 FORMAT_VERSION = 1
 _ENCODING = "square root"
 _LARGEST_VALUES = 4 * 10**9
+_FOREIGN = {lftoolbox_mat.SUFFIX: lftoolbox_mat.read_decoded_mat, eslf.SUFFIX: eslf.read_eslf}
 _SAMPLING = {"origin_px": 2, "step_px": 2, "rotation_rad": 1, "view_step_px": 1}
 
 
 def read_light_field(path: Path) -> LightField:
-    """Read a light field: a ``.h5`` file of lfstereo, or a folder with one image per view.
+    """Read a light field: a ``.h5`` file of lfstereo, a folder with one image per view, or another program's file.
+
+    Other programs' files are the Light Field Toolbox's ``.mat`` and lenslet-packed ``.png`` pictures (ESLF).
 
     Raises
     ------
@@ -34,13 +38,15 @@ def read_light_field(path: Path) -> LightField:
         If views or weights do not fit together.
     """
     if path.is_dir():
-        return read_views_folder(path)
+        return read_picture_folder(path)
     if not path.is_file():
         raise ContainerError(f"{path}: found no such file, expected a light field (.h5) or a folder of views")
+    if path.suffix.lower() in _FOREIGN:
+        return _FOREIGN[path.suffix.lower()](path)
     if path.suffix.lower() not in SUFFIXES:
         raise ContainerError(
-            f"{path}: found the suffix '{path.suffix}', expected .h5 or a folder of views; decode a raw capture with "
-            "'lfstereo decode' first"
+            f"{path}: found the suffix '{path.suffix}', expected .h5, .mat, .png (ESLF) or a folder of views; "
+            "decode a raw capture with 'lfstereo decode' first"
         )
     try:
         with h5py.File(path, "r") as file:

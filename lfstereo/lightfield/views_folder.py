@@ -9,10 +9,11 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from lfstereo.arrays import UInt8, UInt16
+from lfstereo.arrays import Rgb, UInt8, UInt16
 from lfstereo.errors import ContainerError, ShapeError
 from lfstereo.lightfield.encoding import srgb8, srgb_to_linear
 from lfstereo.lightfield.field import LightField
+from lfstereo.lightfield.interchange.description import FILE_NAME, to_text
 from lfstereo.outputs import atomic_folder
 from lfstereo.progress import Progress, silent
 
@@ -21,11 +22,18 @@ _ROW_COLUMN = re.compile(r"(?:^|[^0-9])(\d{1,3})[_-](\d{1,3})$")
 _COUNTED = re.compile(r"(?:cam|view|im|img)_?(\d{2,4})$", re.IGNORECASE)
 
 
-def read_views_folder(folder: Path) -> LightField:
+def read_views_folder(folder: Path, count: tuple[int, int] | None = None) -> LightField:
     """Read a folder of views named by row and column, or numbered row by row.
 
     ``..._RR_CC.png`` (row first, counted from 0 or 1) and the HCI benchmark's ``input_Cam000.png`` to
     ``input_Cam080.png`` (a square number of views) are understood; values are taken as sRGB.
+
+    Parameters
+    ----------
+    folder
+        The folder.
+    count
+        Rows and columns of numbered views, where they are known; ``None`` takes them for a square.
 
     Returns
     -------
@@ -38,7 +46,7 @@ def read_views_folder(folder: Path) -> LightField:
     ShapeError
         If the views differ in size.
     """
-    paths = _numbered(folder)
+    paths = _numbered(folder, count)
     rows, columns = (1 + max(key[axis] for key in paths) for axis in (0, 1))
     missing = [(t, s) for t in range(rows) for s in range(columns) if (t, s) not in paths]
     if missing:
@@ -60,7 +68,7 @@ def read_views_folder(folder: Path) -> LightField:
 
 
 def write_views_folder(folder: Path, light_field: LightField, force: bool = False, progress: Progress = silent) -> None:
-    """Write each view as ``view_TT_SS.png``, 8-bit sRGB; values above 1 are clipped.
+    """Write each view as ``view_TT_SS.png``, 8-bit sRGB, and what they do not say as TOML; values above 1 are clipped.
 
     Raises
     ------
@@ -71,13 +79,24 @@ def write_views_folder(folder: Path, light_field: LightField, force: bool = Fals
     with atomic_folder(folder, force) as scratch:
         for t in range(rows):
             for s in range(columns):
-                picture = srgb8(light_field.views[t, s])
-                if not cv2.imwrite(str(scratch / f"view_{t:02d}_{s:02d}.png"), picture[..., ::-1]):
-                    raise OSError(f"{scratch}: a view could not be written")
+                write_png(scratch / f"view_{t:02d}_{s:02d}.png", light_field.views[t, s])
                 progress(t * columns + s + 1, rows * columns)
+        (scratch / FILE_NAME).write_text(to_text(light_field), "utf-8")
 
 
-def _numbered(folder: Path) -> dict[tuple[int, int], Path]:
+def write_png(path: Path, view: Rgb) -> None:
+    """Write one view as 8-bit sRGB.
+
+    Raises
+    ------
+    OSError
+        If it cannot be written.
+    """
+    if not cv2.imwrite(str(path), srgb8(view)[..., ::-1]):
+        raise OSError(f"{path}: a view could not be written")
+
+
+def _numbered(folder: Path, count: tuple[int, int] | None) -> dict[tuple[int, int], Path]:
     pictures = sorted(p for p in folder.iterdir() if p.suffix.lower() in IMAGE_SUFFIXES)
     pairs = [(found, path) for path in pictures if (found := _ROW_COLUMN.search(path.stem))]
     if pairs:
@@ -89,8 +108,11 @@ def _numbered(folder: Path) -> dict[tuple[int, int], Path]:
             "view_00_00.png (row, column) or input_Cam000.png"
         )
     first = min(number for number, _ in counted)
-    side = math.isqrt(max(number for number, _ in counted) - first + 1)
-    if side * side != max(number for number, _ in counted) - first + 1:
+    number_of_views = max(number for number, _ in counted) - first + 1
+    if count is not None and count[0] * count[1] == number_of_views:
+        return _from_zero([(divmod(number - first, count[1]), path) for number, path in counted], folder)
+    side = math.isqrt(number_of_views)
+    if side * side != number_of_views:
         raise ContainerError(
             f"{folder}: found {len(counted)} numbered views, expected a square number; name them by row and column "
             "(view_00_00.png)"

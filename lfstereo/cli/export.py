@@ -1,0 +1,71 @@
+"""``lfstereo export``: light fields and raw captures in the formats of other programs."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from lfstereo.errors import ConfigError
+from lfstereo.outputs import check_absent
+from lfstereo.progress import StageClock
+
+_FORMATS = ("h5", "mat", "eslf", "hci", "png", "tiff", "dng")
+_CAPTURE_SUFFIXES = (".lfr", ".lfp", ".raw")
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument(
+        "input", type=Path, help="light field (.h5, .mat, ESLF .png, folder of views), or for DNG a raw capture"
+    )
+    parser.add_argument("-o", "--output", type=Path, required=True, help="file or folder to write")
+    parser.add_argument(
+        "--format",
+        choices=_FORMATS,
+        help="h5: lfstereo's own; mat: Light Field Toolbox (MATLAB 7.3); eslf: one lenslet-packed 16-bit PNG; hci: "
+        "folder of the HCI benchmark; png, tiff: folder of 8-bit or 16-bit views; dng: the raw mosaic "
+        "(default: by the output's suffix, a folder of PNG where it has none)",
+    )
+    parser.add_argument("--force", action="store_true", help="replace an output that exists")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Run the command."""
+    source, target = arguments.input, arguments.output
+    check_absent(target, arguments.force)
+    to_dng = arguments.format == "dng" or (arguments.format is None and target.suffix.lower() == ".dng")
+    from_capture = source.suffix.lower() in _CAPTURE_SUFFIXES and not source.is_dir()
+    if to_dng != from_capture:
+        wanted = "a raw capture (.LFR, .LFP, .RAW)" if to_dng else "a light field; decode it first ('lfstereo decode')"
+        raise ConfigError(f"{source}: found the suffix '{source.suffix}', expected {wanted}, for {target}")
+    clock = StageClock(bars=sys.stderr.isatty())
+    if to_dng:
+        _export_capture(source, target, arguments.force, clock)
+    else:
+        _export_views(arguments, clock)
+    print(f"written: {target}")
+    return 0
+
+
+def _export_capture(source: Path, target: Path, force: bool, clock: StageClock) -> None:
+    from lfstereo.container.capture import read_capture
+    from lfstereo.container.dng import SUFFIX, write_dng
+
+    if target.suffix.lower() != SUFFIX:
+        raise ConfigError(f"{target}: found the suffix '{target.suffix}', expected {SUFFIX} for format dng; rename it")
+    with clock.stage("read"):
+        capture = read_capture(source)
+    with clock.stage("write"):
+        write_dng(target, capture, force)
+
+
+def _export_views(arguments: argparse.Namespace, clock: StageClock) -> None:
+    from lfstereo.lightfield.interchange.formats import choose_format, export_light_field
+    from lfstereo.lightfield.store import read_light_field
+
+    name = choose_format(arguments.output, arguments.format)
+    with clock.stage("read"):
+        light_field = read_light_field(arguments.input)
+    with clock.stage("write") as progress:
+        export_light_field(arguments.output, light_field, name, arguments.force, progress)

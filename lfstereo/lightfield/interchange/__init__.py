@@ -1,0 +1,1 @@
+"""Light fields in the formats of other programs, written and read back."""

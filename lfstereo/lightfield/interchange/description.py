@@ -1,0 +1,66 @@
+"""What a picture cannot say of a light field, as a few lines of TOML that travel with it."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import tomllib
+from typing import Any
+
+from lfstereo.errors import ConfigError, ContainerError
+from lfstereo.lightfield.field import LightField, ViewSampling
+from lfstereo.options import from_mapping, to_toml, toml_value
+
+FILE_NAME = "light_field.toml"
+"""Name of the file beside views that holds the text."""
+
+
+@dataclasses.dataclass(frozen=True, slots=True)
+class Description:
+    """What travels with the pictures of a light field."""
+
+    views: tuple[int, int]
+    """Rows and columns of views."""
+    serial: str
+    sampling: ViewSampling | None
+
+
+def to_text(light_field: LightField) -> str:
+    """Return the number of views, the camera's serial number and the sampling as TOML."""
+    rows, columns = light_field.views.shape[:2]
+    lines = f"views = [{rows}, {columns}]\nserial = {toml_value(light_field.serial)}\n"
+    if light_field.sampling is not None:
+        lines += "\n[sampling]\n" + to_toml(light_field.sampling)
+    return lines
+
+
+def from_text(text: str, where: str) -> Description:
+    """Read the text back.
+
+    Raises
+    ------
+    ContainerError
+        If it is not TOML, or a value in it cannot be.
+    """
+    try:
+        table = tomllib.loads(text)
+        sampling = _sampling(table["sampling"], where) if "sampling" in table else None
+        rows, columns = (int(n) for n in table["views"])
+        serial = table["serial"]
+    except (tomllib.TOMLDecodeError, ConfigError, KeyError, TypeError, ValueError) as error:
+        reason = str(error).splitlines()[0]
+        raise ContainerError(f"{where}: not a description of a light field ({reason}); export it again") from error
+    if not isinstance(serial, str) or rows < 1 or columns < 1:
+        raise ContainerError(
+            f"{where}: found serial {serial!r} and {rows} x {columns} views, expected a text and positive numbers; "
+            "export it again"
+        )
+    return Description((rows, columns), serial, sampling)
+
+
+def _sampling(table: Any, where: str) -> ViewSampling:
+    sampling = from_mapping(ViewSampling, dict(table), f"{where} [sampling]")
+    numbers = (*sampling.origin_px, *sampling.step_px, sampling.rotation_rad, sampling.view_step_px)
+    if not all(math.isfinite(n) for n in numbers) or min(*sampling.step_px, sampling.view_step_px) <= 0:
+        raise ValueError(f"found sampling {numbers}, expected finite numbers and positive steps")
+    return sampling

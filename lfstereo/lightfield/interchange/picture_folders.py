@@ -1,0 +1,124 @@
+"""Folders of views: 16-bit TIFF with a colour profile, and the layout of the HCI 4-D light field benchmark."""
+
+from __future__ import annotations
+
+import configparser
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import tifffile
+
+from lfstereo.arrays import Rgb
+from lfstereo.errors import ContainerError
+from lfstereo.lightfield.encoding import srgb16
+from lfstereo.lightfield.field import LightField
+from lfstereo.lightfield.interchange.description import FILE_NAME, Description, from_text, to_text
+from lfstereo.lightfield.interchange.icc import srgb_profile
+from lfstereo.lightfield.views_folder import read_views_folder, write_png
+from lfstereo.outputs import atomic_folder
+from lfstereo.progress import Progress, silent
+
+PARAMETERS = "parameters.cfg"
+
+
+def write_tiff_folder(folder: Path, light_field: LightField, force: bool = False, progress: Progress = silent) -> None:
+    """Write each view as ``view_TT_SS.tif``, 16-bit sRGB with its ICC profile; values above 1 are clipped.
+
+    Raises
+    ------
+    OutputError
+        If the folder exists and ``force`` is not set, or it cannot be written.
+    """
+    profile = srgb_profile()
+
+    def write(path: Path, view: Rgb) -> None:
+        tifffile.imwrite(path, srgb16(view), photometric="rgb", iccprofile=profile, metadata=None, software="lfstereo")
+
+    with atomic_folder(folder, force) as scratch:
+        _write_views(scratch, "view_{t:02d}_{s:02d}.tif", write, light_field, progress)
+
+
+def write_hci_folder(folder: Path, light_field: LightField, force: bool = False, progress: Progress = silent) -> None:
+    """Write the views as the HCI benchmark has them: ``input_Cam000.png`` row by row, and ``parameters.cfg``.
+
+    The benchmark's disparity is the slope here, px per view and positive for nearer. Lengths in mm, from which depth
+    would follow, are left out of ``parameters.cfg``: a light field alone does not tell them.
+
+    Raises
+    ------
+    OutputError
+        If the folder exists and ``force`` is not set, or it cannot be written.
+
+    References
+    ----------
+    Honauer, Johannsen, Kondermann, Goldluecke, "A dataset and evaluation methodology for depth estimation on 4D light
+    fields" (ACCV 2016), and the parameter files of its scenes.
+    """
+    rows, columns, height, width = light_field.views.shape[:4]
+    parameters = configparser.ConfigParser()
+    parameters["intrinsics"] = {"image_resolution_x_px": str(width), "image_resolution_y_px": str(height)}
+    parameters["extrinsics"] = {"num_cams_x": str(columns), "num_cams_y": str(rows)}
+    parameters["meta"] = {"scene": folder.name.replace("%", "%%")}
+    with atomic_folder(folder, force) as scratch:
+        _write_views(scratch, "input_Cam{n:03d}.png", write_png, light_field, progress)
+        with (scratch / PARAMETERS).open("w", encoding="utf-8") as file:
+            parameters.write(file)
+
+
+def read_picture_folder(folder: Path) -> LightField:
+    """Read a folder of views of any of these layouts, and what is written beside them.
+
+    Raises
+    ------
+    ContainerError
+        If the folder holds no views, one is missing or unreadable, or the text beside them cannot be used.
+    ShapeError
+        If the views differ in size.
+    """
+    found = _beside(folder)
+    light_field = read_views_folder(folder, found.views if found is not None else _hci_views(folder))
+    if found is None:
+        return light_field
+    if light_field.views.shape[:2] != found.views:
+        rows, columns = light_field.views.shape[:2]
+        raise ContainerError(
+            f"{folder}: found {rows} x {columns} views, expected {found.views[0]} x {found.views[1]} as in "
+            f"{FILE_NAME}; complete the folder or remove that file"
+        )
+    return replace(light_field, sampling=found.sampling, serial=found.serial)
+
+
+def _write_views(
+    folder: Path, name: str, write: Callable[[Path, Rgb], None], light_field: LightField, progress: Progress
+) -> None:
+    rows, columns = light_field.views.shape[:2]
+    for t in range(rows):
+        for s in range(columns):
+            write(folder / name.format(t=t, s=s, n=t * columns + s), light_field.views[t, s])
+            progress(t * columns + s + 1, rows * columns)
+    (folder / FILE_NAME).write_text(to_text(light_field), "utf-8")
+
+
+def _beside(folder: Path) -> Description | None:
+    path = folder / FILE_NAME
+    if not path.is_file():
+        return None
+    return from_text(path.read_text("utf-8", "replace"), str(path))
+
+
+def _hci_views(folder: Path) -> tuple[int, int] | None:
+    path = folder / PARAMETERS
+    if not path.is_file():
+        return None
+    parameters = configparser.ConfigParser(interpolation=None)
+    try:
+        parameters.read_string(path.read_text("utf-8", "replace"))
+        extrinsics = parameters["extrinsics"]
+        rows, columns = int(extrinsics["num_cams_y"]), int(extrinsics["num_cams_x"])
+    except (configparser.Error, KeyError, ValueError) as error:
+        reason = str(error).splitlines()[0]
+        raise ContainerError(
+            f"{path}: found no num_cams_x and num_cams_y under [extrinsics] ({reason}); correct or remove that file"
+        ) from error
+    return rows, columns
