@@ -22,6 +22,10 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "decode": ("lfstereo.cli.decode", "raw capture to 4-D light field"),
     "export": ("lfstereo.cli.export", "light field or raw capture to the format of another program"),
     "run": ("lfstereo.cli.run", "two captures to disparity, depth, all-in-focus image and point cloud"),
+    "synthesize": (
+        "lfstereo.cli.synthesize",
+        "a dual focal stack data set from stereo pictures of known disparity",
+    ),
     "train": ("lfstereo.cli.train", "train a network from a recipe"),
     "evaluate": (
         "lfstereo.cli.evaluate",
