@@ -20,6 +20,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "target": ("lfstereo.cli.target", "draw a calibration board to print, and its TOML file"),
     "calibrate": ("lfstereo.cli.calibrate", "photographs of a calibration board by both cameras to a rig"),
     "decode": ("lfstereo.cli.decode", "raw capture to 4-D light field"),
+    "view-grid": ("lfstereo.cli.view_grid", "picture of a lenslet grid over its frame, and of what it leaves"),
     "export": ("lfstereo.cli.export", "light field or raw capture to the format of another program"),
     "run": ("lfstereo.cli.run", "two captures to disparity, depth, all-in-focus image and point cloud"),
     "synthesize": (
