@@ -6,6 +6,7 @@ import argparse
 import csv
 import json
 import re
+from collections.abc import Iterator
 from contextlib import nullcontext
 from dataclasses import asdict, fields
 from pathlib import Path
@@ -19,6 +20,7 @@ from lfstereo.simulate.photograph import PhotographOptions
 from lfstereo.simulate.virtual_dslr import VirtualDslrOptions
 
 if TYPE_CHECKING:
+    from lfstereo.simulate.stack_dataset import DualStack
     from lfstereo.training.comparison import Row
 
 _TITLES = ("MAE/100", "MAE px", "bad 0.5", "bad 1", "bad 2", "bad 4", "density", "PSNR dB", "s")
@@ -27,7 +29,10 @@ _TITLES = ("MAE/100", "MAE px", "bad 0.5", "bad 1", "bad 2", "bad 4", "density",
 def configure(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument(
-        "folders", nargs="*", type=Path, help="Middlebury scenes, folders of them, or FlyingThings3D; photographed anew"
+        "folders",
+        nargs="*",
+        type=Path,
+        help="Middlebury scenes, folders of them, or FlyingThings3D, photographed anew; or dual focal stack data sets",
     )
     parser.add_argument("--synthetic", type=int, default=0, metavar="N", help="also N rendered, held-out scenes")
     parser.add_argument("--size", default="540x960", metavar="HxW", help="of rendered scenes [px] (default: 540x960)")
@@ -35,6 +40,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--no-network", action="store_true", help="classical methods only")
     parser.add_argument("--device", choices=("auto", "cpu", "cuda"), default="auto", help="where networks run")
     parser.add_argument("--disparity-scale", type=float, help="what grey-coded disparities are divided by")
+    parser.add_argument("--far-first", action="store_true", help="slice 0 is the farthest in data sets of other makers")
     parser.add_argument("-o", "--output", type=Path, help="CSV file with one row per scene and method")
     parser.add_argument("--force", action="store_true", help="replace a CSV file that exists")
     parser.add_argument("--json", action="store_true", help="print the rows as JSON on stdout")
@@ -44,7 +50,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the command."""
-    height, width = _size(arguments.size)
+    height, width = picture_size("--size", arguments.size)
     if arguments.synthetic < 0 or not (arguments.folders or arguments.synthetic):
         raise ConfigError(
             f"nothing to evaluate on: found no folder and --synthetic {arguments.synthetic}; give a folder of scenes, "
@@ -52,24 +58,12 @@ def run(arguments: argparse.Namespace) -> int:
         )
     if arguments.output:
         check_absent(arguments.output, arguments.force)
-    from itertools import chain
-
     from lfstereo.network.estimate import load_network
     from lfstereo.network.weights import DEFAULT_MODEL
-    from lfstereo.simulate.stereo_scenes import find_scenes
-    from lfstereo.training.comparison import compare, photographed_cases, summarise, synthetic_cases
-    from lfstereo.training.evaluate import HELD_OUT_SEED
+    from lfstereo.training.comparison import compare, summarise
 
-    options = from_arguments(PhotographOptions, arguments)
-    dslr = from_arguments(VirtualDslrOptions, arguments)
-    scenes = [scene for folder in arguments.folders for scene in find_scenes(folder, arguments.disparity_scale)]
+    total, cases = _cases(arguments, height, width)
     network = None if arguments.no_network else load_network(arguments.model or DEFAULT_MODEL, arguments.device)
-    ratio = getattr(arguments, "aperture_ratio", None)
-    cases = chain(
-        synthetic_cases(arguments.synthetic, height, width, ratio, HELD_OUT_SEED + dslr.seed),
-        photographed_cases(scenes, options, dslr),
-    )
-    total = arguments.synthetic + len(scenes)
     rows: list[Row] = []
     with nullcontext(silent) if arguments.json else progress_bar("evaluate") as progress:
         for done, case in enumerate(cases):
@@ -85,10 +79,42 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _size(text: str) -> tuple[int, int]:
+def _cases(arguments: argparse.Namespace, height: int, width: int) -> tuple[int, Iterator[DualStack]]:
+    """Count the scenes to judge on, and make them one at a time."""
+    from itertools import chain
+
+    from lfstereo.simulate.stack_dataset import list_dual_stacks, stack_folder
+    from lfstereo.simulate.stereo_scenes import find_scenes
+    from lfstereo.training.comparison import dataset_cases, photographed_cases, synthetic_cases
+    from lfstereo.training.evaluate import HELD_OUT_SEED
+
+    options, dslr = from_arguments(PhotographOptions, arguments), from_arguments(VirtualDslrOptions, arguments)
+    ratio = getattr(arguments, "aperture_ratio", None)
+    sources = [synthetic_cases(arguments.synthetic, height, width, ratio, HELD_OUT_SEED + dslr.seed)]
+    total = arguments.synthetic
+    for folder in arguments.folders:
+        if stack_folder(folder, dslr.noise).is_dir():
+            names = list_dual_stacks(folder, "test", dslr.noise)
+            sources.append(dataset_cases(folder, names, dslr.noise, options if ratio else None, arguments.far_first))
+            total += len(names)
+        else:
+            scenes = find_scenes(folder, arguments.disparity_scale)
+            sources.append(photographed_cases(scenes, options, dslr))
+            total += len(scenes)
+    return total, chain.from_iterable(sources)
+
+
+def picture_size(flag: str, text: str) -> tuple[int, int]:
+    """Read ``HEIGHTxWIDTH``.
+
+    Raises
+    ------
+    ConfigError
+        If it is not of that form, or smaller than 64x64 px.
+    """
     match = re.fullmatch(r"(\d+)x(\d+)", text)
     if not match or min(size := (int(match[1]), int(match[2]))) < 64:
-        raise ConfigError(f"--size {text}: expected HEIGHTxWIDTH in px, 64x64 or more, such as 540x960")
+        raise ConfigError(f"{flag} {text}: expected HEIGHTxWIDTH in px, 64x64 or more, such as 540x960")
     return size
 
 

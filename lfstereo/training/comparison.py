@@ -6,23 +6,26 @@ import math
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields
+from pathlib import Path
 
 import numpy as np
 import torch
 from torch import Tensor, nn
 
-from lfstereo.arrays import Bool, Float32, Rgb
+from lfstereo.arrays import Bool, Float32
 from lfstereo.conventions import DISPARITY_RANGE_PX
 from lfstereo.depth.baselines import fill_from_background, sgbm, sgbm_wls
 from lfstereo.depth.metrics import score_disparity
 from lfstereo.focus.measures import depth_from_focus
-from lfstereo.focus.stack import FocalStack
 from lfstereo.network.encoding import decode, encode, exposure_of
 from lfstereo.network.estimate import Network, check_stacks, network_input
-from lfstereo.simulate.photograph import PhotographOptions, photograph_pair
+from lfstereo.simulate.photograph import PhotographOptions
+from lfstereo.simulate.stack_dataset import DualStack, read_dual_stack
 from lfstereo.simulate.stereo_scenes import SceneFiles, read_scene
+from lfstereo.simulate.synthesis import photograph
 from lfstereo.simulate.virtual_dslr import VirtualDslrOptions
-from lfstereo.training.samples import SLICE_DISPARITIES, StackSample, stack_sample
+from lfstereo.training.generated_dataset import dual_stack_of
+from lfstereo.training.samples import stack_sample
 from lfstereo.training.textures import texture_bank
 
 NETWORKS = ("Focus-Net", "Focus-Net-Guided", "Stereo-Net", "BDfF-Net")
@@ -31,22 +34,6 @@ EDOF = "EDoF-Net"
 WLS_ON_EDOF = "SGBM+WLS on EDoF"
 """Classical stereo on the two images of EDoF-Net: it sees no more than the networks do."""
 ALL = "all"
-
-
-@dataclass(frozen=True, slots=True)
-class Case:
-    """One scene to be judged on."""
-
-    name: str
-    left: FocalStack
-    right: FocalStack
-    sharp: Rgb
-    """``(H, W, 3)`` linear RGB, left view, all in focus and without noise."""
-    sharp_right: Rgb
-    truth: Float32
-    """``(H, W)`` px of the left view."""
-    known: Bool
-    """``(H, W)``: pixels that count, occluded ones too."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,40 +57,33 @@ class Row:
     """Of the all-in-focus image against the sharp one, display-referred."""
 
 
-def synthetic_case(index: int, height: int, width: int, aperture_ratio: float | None, seed: int, bank: Float32) -> Case:
-    """Render one held-out scene from its seed; black margins do not count."""
-    sample = stack_sample(np.random.default_rng([seed, index]), bank, height, width, aperture_ratio)
-    return case_of_sample(f"synthetic-{index:03d}", sample)
-
-
-def case_of_sample(name: str, sample: StackSample) -> Case:
-    """Turn a training sample into a case in linear light."""
-    stacks = [
-        FocalStack(decode(sample.stacks[eye], 1.0), SLICE_DISPARITIES, sample.aperture_ratio, f"{name} {side}")
-        for eye, side in enumerate(("left", "right"))
-    ]
-    sharp = decode(sample.sharp, 1.0)
-    return Case(name, stacks[0], stacks[1], sharp[0], sharp[1], sample.disparity[0], sample.valid[0])
-
-
-def synthetic_cases(count: int, height: int, width: int, aperture_ratio: float | None, seed: int) -> Iterator[Case]:
-    """Render held-out scenes, one at a time; ``seed`` decides scenes and textures."""
+def synthetic_cases(
+    count: int, height: int, width: int, aperture_ratio: float | None, seed: int
+) -> Iterator[DualStack]:
+    """Render held-out scenes, one at a time; ``seed`` decides scenes and textures. Black margins do not count."""
     bank = texture_bank(seed, 96)
     for index in range(count):
-        yield synthetic_case(index, height, width, aperture_ratio, seed, bank)
+        sample = stack_sample(np.random.default_rng([seed, index]), bank, height, width, aperture_ratio)
+        yield dual_stack_of(f"synthetic-{index:03d}", sample)
 
 
 def photographed_cases(
     scenes: Sequence[SceneFiles], options: PhotographOptions, dslr: VirtualDslrOptions
-) -> Iterator[Case]:
+) -> Iterator[DualStack]:
     """Photograph stereo scenes with the Virtual DSLR, one at a time."""
     for files in scenes:
-        scene = read_scene(files)
-        left, right = photograph_pair(scene, options, dslr)
-        yield Case(scene.name, left, right, scene.left, scene.right, scene.disparity, scene.known)
+        yield photograph(read_scene(files), options, dslr)
 
 
-def compare(case: Case, network: Network | None) -> list[Row]:
+def dataset_cases(
+    root: Path, names: Sequence[str], noisy: bool, lens: PhotographOptions | None, far_first: bool
+) -> Iterator[DualStack]:
+    """Read scenes of the test part of a dual focal stack data set, one at a time."""
+    for name in names:
+        yield read_dual_stack(root, "test", name, noisy, lens, far_first)
+
+
+def compare(case: DualStack, network: Network | None) -> list[Row]:
     """Judge every method on one scene.
 
     The stereo baselines get the sharp views without noise, which is more than the networks get; what SGBM leaves
@@ -147,7 +127,7 @@ def summarise(rows: Sequence[Row]) -> list[Row]:
     return found
 
 
-def _network_rows(case: Case, network: Network) -> list[Row]:
+def _network_rows(case: DualStack, network: Network) -> list[Row]:
     architecture = network.module.architecture
     check_stacks(case.left, case.right, architecture.slices)
     exposure = exposure_of(case.left.slices, case.right.slices)
@@ -160,7 +140,7 @@ def _network_rows(case: Case, network: Network) -> list[Row]:
         found = network.module(left, right, (float(foci[-1]), float(foci[0])))
         total = clock.total()
     spent = clock.seconds
-    height, width = case.truth.shape
+    height, width = case.disparity.shape
     seconds = {
         NETWORKS[0]: spent["focus"],
         NETWORKS[1]: spent["edof"] / 2 + spent["focus"] + spent["guided"],
@@ -195,8 +175,8 @@ def psnr_db(picture: Float32, truth: Float32, counted: Bool) -> float:
     return -10 * math.log10(max(error, 1e-12))
 
 
-def _row(case: Case, method: str, disparity: Float32, seconds: float, answered: Bool | None = None) -> Row:
-    scores = score_disparity(np.maximum(disparity, 0), case.truth, case.known, answered)
+def _row(case: DualStack, method: str, disparity: Float32, seconds: float, answered: Bool | None = None) -> Row:
+    scores = score_disparity(np.maximum(disparity, 0), case.disparity, case.known, answered)
     return Row(
         scene=case.name,
         method=method,

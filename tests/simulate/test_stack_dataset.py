@@ -161,7 +161,7 @@ def test_a_pair_of_your_own(tmp_path: Path) -> None:
 def test_bad_requests_are_one_line(words: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["synthesize", "-o", str(tmp_path / "out"), *words]) == 3
     error = capsys.readouterr().err
-    assert ("found more than once" if words else "nothing to photograph") in error
+    assert ("found more than once" if words else "give folders of scenes or --pair") in error
     assert error.count("\n") == 1
     assert not (tmp_path / "out").exists()
 

@@ -19,10 +19,12 @@ from lfstereo.network.bdff_net import Architecture, BdffNet
 from lfstereo.network.card import ModelCard, Training
 from lfstereo.network.estimate import Network
 from lfstereo.simulate.photograph import PhotographOptions, focus_disparities, photograph_pair
+from lfstereo.simulate.stack_dataset import DualStack, read_dual_stack
 from lfstereo.simulate.stereo_scenes import StereoScene
+from lfstereo.simulate.synthesis import photograph
 from lfstereo.simulate.virtual_dslr import VirtualDslrOptions
 from lfstereo.training import comparison
-from lfstereo.training.comparison import BASELINES, EDOF, NETWORKS, WLS_ON_EDOF, Case, Row, compare, summarise
+from lfstereo.training.comparison import BASELINES, EDOF, NETWORKS, WLS_ON_EDOF, Row, compare, summarise
 
 HEIGHT, WIDTH = 64, 128
 QUICK = VirtualDslrOptions(lens_samples=4, noise=False)
@@ -42,10 +44,8 @@ def scene() -> StereoScene:
 
 
 @pytest.fixture(scope="module")
-def case() -> Case:
-    pair = scene()
-    left, right = photograph_pair(pair, PhotographOptions(aperture_ratio=0.4, near_px=32), QUICK)
-    return Case(pair.name, left, right, pair.left, pair.right, pair.disparity, pair.known)
+def case() -> DualStack:
+    return photograph(scene(), PhotographOptions(aperture_ratio=0.4, near_px=32), QUICK)
 
 
 @pytest.fixture(scope="module")
@@ -72,7 +72,7 @@ def write_middlebury(folder: Path, suffix: str = "2014") -> Path:
     return folder
 
 
-def test_every_method_is_judged(case: Case, network: Network) -> None:
+def test_every_method_is_judged(case: DualStack, network: Network) -> None:
     rows = {row.method: row for row in compare(case, network)}
     assert set(rows) == {*NETWORKS, EDOF, WLS_ON_EDOF, *BASELINES}
     assert rows["SGBM+WLS filled"].mae_px < 1.0  # px; an easy scene
@@ -84,7 +84,7 @@ def test_every_method_is_judged(case: Case, network: Network) -> None:
 
 
 def test_the_network_rows_are_the_maps_of_the_network(
-    case: Case, network: Network, monkeypatch: pytest.MonkeyPatch
+    case: DualStack, network: Network, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A network that answers 8 px everywhere is off by 12 px on the square alone."""
 
@@ -144,6 +144,28 @@ def test_held_out_scenes_as_a_table(
     assert "synthetic-000" in printed and "mean of 2 scenes" in printed
     for method in (*NETWORKS, EDOF, *BASELINES):
         assert printed.count(f"  {method}  ") == 3
+
+
+def test_generated_data_set_is_written_resumed_and_evaluated(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bank = np.random.default_rng(1).random((2, 256, 256, 3), dtype=np.float32)
+    monkeypatch.setattr("lfstereo.training.generated_dataset.texture_bank", lambda seed, count: bank)
+    words = ["synthesize", "--generated", "64x96", "--train", "1", "--test", "1", "-o", str(tmp_path)]
+    assert main([*words, "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["written"] == [
+        "train/generated-train-00000",
+        "test/generated-test-00000",
+    ]
+    assert main(words) == 0
+    assert "0 scenes of 16 slices per view written, 2 were there" in capsys.readouterr().out
+    read = read_dual_stack(tmp_path, "test", "generated-test-00000", noisy=True)
+    assert read.left.slices.shape == (16, 64, 96, 3) and 0 <= read.disparity.min() <= read.disparity.max() <= 100
+    assert main(["evaluate", str(tmp_path), "--no-network", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert {row["scene"] for row in found["scenes"]} == {"generated-test-00000"}
+    assert main([*words, "--slices", "8"]) == 3
+    assert "expected 16 slices from 100 to 0 px with noise" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
