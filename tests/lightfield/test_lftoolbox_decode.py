@@ -116,6 +116,41 @@ def test_alignment_of_an_illum(crop: tuple[Capture, Capture, LensletGrid, np.nda
     assert lattice.to_raw @ aligned == pytest.approx(expected, abs=0.03)
 
 
+@pytest.mark.parametrize("shifted", [0, 1])
+@pytest.mark.parametrize(("pitch", "count"), [(14.3, 15), (9.93, 9), (12.01, 13)])
+def test_every_view_of_a_ramp_lies_where_the_sampling_says(pitch: float, count: int, shifted: int) -> None:
+    """A brightness that grows evenly over the sensor comes through every linear step unchanged.
+
+    The pitches are an Illum's and an F01's, whose x axis is the coarser one, and one whose y axis is.
+    """
+    shape, rotation, lean = (300, 340), 0.004, 0.05
+    cos, sin = np.cos(rotation), np.sin(rotation)
+    down = pitch * np.sqrt(3) / 2
+    # A lean of the rows of lenslets by hundredths of a px each, which the toolbox straightens about the middle row.
+    step_v = (-down * sin + lean * cos, down * cos + lean * sin)
+    grid = LensletGrid((17.3, 18.1), (pitch * cos, pitch * sin), step_v, shifted, 15, 17, shape, 0.0, 1.0, "given")
+    y, x = np.mgrid[: shape[0], : shape[1]]
+    metadata = replace(read_camera_profile("lytro-illum"), width=shape[1], height=shape[0])
+    ramp = np.rint(64 + 959 * (0.1 + 0.0015 * x + 0.001 * y)).astype(np.uint16)
+    found = decode_as_lftoolbox(
+        Capture(ramp, metadata, "ramp"), Capture(np.full(shape, 1023, np.uint16), metadata, "white"), grid
+    )
+    assert found.views.shape[:4] == (count, count, 15, int(np.ceil(17 * 2 / np.sqrt(3))))
+    assert found.sampling is not None and found.weight is not None
+    sampling, middle = found.sampling, count // 2
+    v, u = np.mgrid[:15, : found.views.shape[3]]
+    for t, s in ((middle, middle), (middle, middle - 3), (middle + 3, middle), (middle - 2, middle + 2)):
+        across = u * sampling.step_px[0] + (s - middle) * sampling.view_step_px
+        along = v * sampling.step_px[1] + (t - middle) * sampling.view_step_px
+        true_x = sampling.origin_px[0] + cos * across - sin * along
+        true_y = sampling.origin_px[1] + sin * across + cos * along
+        expected = 0.1 + 0.0015 * true_x + 0.001 * true_y
+        error = (found.views[t, s, ..., 1] - expected)[:, 1:-2]
+        assert np.abs(error).max() < 1.0 / 959  # half a digital number of rounding, some more by the demosaic
+        assert abs(error.mean()) < 1e-4
+        assert (found.weight[t, s][:, 1:-2] == 255).all()
+
+
 def test_what_the_method_cannot_do(draw_frame: Callable[..., Any], white: Capture) -> None:
     photo = draw_frame(scene=lambda x, y: 0.5 + 0 * x).capture
     with pytest.raises(AssetError, match="method lftoolbox: found no white image"):
