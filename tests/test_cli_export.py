@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import configparser
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +15,7 @@ import rawpy
 from lfstereo.cli.main import main
 from lfstereo.container import write_capture
 from lfstereo.lightfield import LightField, ViewSampling, read_light_field, write_light_field
+from lfstereo.rig.rig import PlenopticCamera, StereoRig, write_rig
 
 
 @pytest.fixture
@@ -50,6 +53,40 @@ def test_capture_to_dng(tmp_path: Path, draw_frame: Callable[..., Any]) -> None:
     assert main(["export", str(tmp_path / "photo.LFR"), "-o", str(tmp_path / "photo.dng")]) == 0
     with rawpy.imread(str(tmp_path / "photo.dng")) as raw:
         np.testing.assert_array_equal(raw.raw_image, capture.mosaic)
+
+
+@pytest.fixture
+def rig(tmp_path: Path) -> Path:
+    camera = PlenopticCamera("SIM1", (62, 50), (14000.0, 14000.0), (31.0, 25.0), 0.85, 0.0007)
+    other = replace(camera, serial="SIM2")
+    pair = StereoRig(camera, other, (0.0, 0.0, 0.0), (-0.1, 0.0, 0.0), 0.6, 1.2, 12.4)
+    write_rig(tmp_path / "rig.toml", pair)
+    return tmp_path / "rig.toml"
+
+
+def test_benchmark_folder_with_a_rig_tells_depth(scene: Path, rig: Path) -> None:
+    target = scene.parent / "hci"
+    assert main(["export", str(scene), "-o", str(target), "--format", "hci", "--rig", str(rig)]) == 0
+    found = configparser.ConfigParser()
+    found.read(target / "parameters.cfg")
+    sensor, focal = (float(found["intrinsics"][name]) for name in ("sensor_size_mm", "focal_length_mm"))
+    baseline, focus = (float(found["extrinsics"][name]) for name in ("baseline_mm", "focus_distance_m"))
+    assert baseline == pytest.approx(0.7 * 0.884)
+    # The benchmark's own formula for depth in mm, at the slope that a point 0.6 m away has by our conventions.
+    slope = 14000 / 12.4 * 0.0007 * 0.884 * (1 / 0.6 - 1 / 0.85)
+    beta, focus_mm = baseline * focal * 5, 1000 * focus
+    assert beta * focus_mm / (slope * focus_mm * sensor + beta) == pytest.approx(600, rel=1e-6)
+
+
+def test_rig_that_does_not_fit(scene: Path, rig: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["export", str(scene), "-o", str(scene.parent / "a"), "--rig", str(rig)]
+    assert main(words) == 3
+    assert "--rig: found the format png, expected hci" in capsys.readouterr().err
+    assert main([*words, "--format", "hci", "--side", "right"]) == 3
+    assert "found camera SIM1, expected SIM2, the right one of" in capsys.readouterr().err
+    write_light_field(scene, replace(read_light_field(scene), sampling=None), force=True)
+    assert main([*words, "--format", "hci"]) == 3
+    assert "found views without a place on the sensor" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

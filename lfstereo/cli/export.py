@@ -5,10 +5,15 @@ from __future__ import annotations
 import argparse
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from lfstereo.errors import ConfigError
 from lfstereo.outputs import check_absent
 from lfstereo.progress import StageClock
+
+if TYPE_CHECKING:
+    from lfstereo.lightfield.field import LightField
+    from lfstereo.lightfield.interchange.picture_folders import HciLengths
 
 _FORMATS = ("h5", "mat", "eslf", "hci", "png", "tiff", "dng")
 _CAPTURE_SUFFIXES = (".lfr", ".lfp", ".raw")
@@ -27,6 +32,8 @@ def configure(parser: argparse.ArgumentParser) -> None:
         "folder of the HCI benchmark; png, tiff: folder of 8-bit or 16-bit views; dng: the raw mosaic "
         "(default: by the output's suffix, a folder of PNG where it has none)",
     )
+    parser.add_argument("--rig", type=Path, help="rig file: lets depth be told from the disparities of an HCI folder")
+    parser.add_argument("--side", choices=("left", "right"), default="left", help="camera of the rig (default: left)")
     parser.add_argument("--force", action="store_true", help="replace an output that exists")
 
 
@@ -62,10 +69,47 @@ def _export_capture(source: Path, target: Path, force: bool, clock: StageClock) 
 
 def _export_views(arguments: argparse.Namespace, clock: StageClock) -> None:
     from lfstereo.lightfield.interchange.formats import choose_format, export_light_field
+    from lfstereo.lightfield.interchange.picture_folders import write_hci_folder
     from lfstereo.lightfield.store import read_light_field
 
     name = choose_format(arguments.output, arguments.format)
+    if arguments.rig is not None and name != "hci":
+        raise ConfigError(f"--rig: found the format {name}, expected hci; leave --rig out")
     with clock.stage("read"):
         light_field = read_light_field(arguments.input)
+        lengths = _lengths(arguments.rig, arguments.side, light_field) if arguments.rig is not None else None
     with clock.stage("write") as progress:
+        if lengths is not None:
+            write_hci_folder(arguments.output, light_field, arguments.force, progress, lengths)
+            return
         export_light_field(arguments.output, light_field, name, arguments.force, progress)
+
+
+def _lengths(path: Path, side: str, light_field: LightField) -> HciLengths:
+    """Return the lengths with which the benchmark's formula gives a camera's depths.
+
+    The benchmark has ``1/Z = 1/Zf + d * sensor / (baseline * focal * width)``; here it is
+    ``1/Z = 1/Zf + sigma / (fx / step * baseline)``.
+    """
+    from lfstereo.lightfield.interchange.picture_folders import SENSOR_SIZE_MM, HciLengths
+    from lfstereo.rig.rig import read_rig
+
+    rig = read_rig(path)
+    camera = rig.left if side == "left" else rig.right
+    sampling = light_field.sampling
+    if sampling is None:
+        raise ConfigError(
+            f"{light_field.source}: found views without a place on the sensor, expected a light field that was decoded "
+            "from a raw capture, for --rig; leave --rig out"
+        )
+    if camera.serial and light_field.serial and camera.serial != light_field.serial:
+        raise ConfigError(
+            f"{light_field.source}: found camera {light_field.serial}, expected {camera.serial}, the {side} one of "
+            f"{path}; give the other --side or the rig of this camera"
+        )
+    focal_px = camera.focal_px[0] / sampling.step_px[0]
+    return HciLengths(
+        focal_length_mm=SENSOR_SIZE_MM * focal_px / max(light_field.views.shape[2:4]),
+        baseline_mm=1000 * camera.pupil_m_per_px * sampling.view_step_px,
+        focus_distance_m=camera.focus_distance_m,
+    )

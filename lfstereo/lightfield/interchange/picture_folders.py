@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import configparser
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import tifffile
@@ -39,11 +39,46 @@ def write_tiff_folder(folder: Path, light_field: LightField, force: bool = False
         _write_views(scratch, "view_{t:02d}_{s:02d}.tif", write, light_field, progress)
 
 
-def write_hci_folder(folder: Path, light_field: LightField, force: bool = False, progress: Progress = silent) -> None:
+SENSOR_SIZE_MM = 35.0
+"""The benchmark's sensor; only its ratio to the focal length counts."""
+
+
+@dataclass(frozen=True, slots=True)
+class HciLengths:
+    """What turns disparities of the HCI benchmark into depth."""
+
+    focal_length_mm: float
+    """For a sensor whose longer side is ``SENSOR_SIZE_MM``."""
+    baseline_mm: float
+    """Between neighbouring views."""
+    focus_distance_m: float
+    """Depth of disparity 0."""
+
+
+def write_hci_folder(
+    folder: Path,
+    light_field: LightField,
+    force: bool = False,
+    progress: Progress = silent,
+    lengths: HciLengths | None = None,
+) -> None:
     """Write the views as the HCI benchmark has them: ``input_Cam000.png`` row by row, and ``parameters.cfg``.
 
-    The benchmark's disparity is the slope here, px per view and positive for nearer. Lengths in mm, from which depth
-    would follow, are left out of ``parameters.cfg``: a light field alone does not tell them.
+    The benchmark's disparity is the slope here, px per view and positive for nearer.
+
+    Parameters
+    ----------
+    folder
+        Folder to write.
+    light_field
+        What to write.
+    force
+        Replace an existing folder.
+    progress
+        Told of the views written.
+    lengths
+        What turns disparity into depth; left out of ``parameters.cfg`` where it is ``None``, as a light field alone
+        does not tell it.
 
     Raises
     ------
@@ -56,10 +91,16 @@ def write_hci_folder(folder: Path, light_field: LightField, force: bool = False,
     fields" (ACCV 2016), and the parameter files of its scenes.
     """
     rows, columns, height, width = light_field.views.shape[:4]
-    parameters = configparser.ConfigParser()
-    parameters["intrinsics"] = {"image_resolution_x_px": str(width), "image_resolution_y_px": str(height)}
-    parameters["extrinsics"] = {"num_cams_x": str(columns), "num_cams_y": str(rows)}
-    parameters["meta"] = {"scene": folder.name.replace("%", "%%")}
+    intrinsics = {"image_resolution_x_px": str(width), "image_resolution_y_px": str(height)}
+    extrinsics = {"num_cams_x": str(columns), "num_cams_y": str(rows)}
+    if lengths is not None:
+        intrinsics |= {"focal_length_mm": str(float(lengths.focal_length_mm)), "sensor_size_mm": str(SENSOR_SIZE_MM)}
+        extrinsics |= {
+            "baseline_mm": str(float(lengths.baseline_mm)),
+            "focus_distance_m": str(float(lengths.focus_distance_m)),
+        }
+    parameters = configparser.ConfigParser(interpolation=None)
+    parameters.read_dict({"intrinsics": intrinsics, "extrinsics": extrinsics, "meta": {"scene": folder.name}})
     with atomic_folder(folder, force) as scratch:
         _write_views(scratch, "input_Cam{n:03d}.png", write_png, light_field, progress)
         with (scratch / PARAMETERS).open("w", encoding="utf-8") as file:
