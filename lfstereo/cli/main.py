@@ -19,6 +19,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "simulate": ("lfstereo.cli.simulate", "make a dual-Illum capture of a scene with known depth"),
     "target": ("lfstereo.cli.target", "draw a calibration board to print, and its TOML file"),
     "calibrate": ("lfstereo.cli.calibrate", "photographs of a calibration board by both cameras to a rig"),
+    "rig": ("lfstereo.cli.rig", "a rig to and from the files of OpenCV, Kalibr and others"),
     "decode": ("lfstereo.cli.decode", "raw capture to 4-D light field"),
     "view-grid": ("lfstereo.cli.view_grid", "picture of a lenslet grid over its frame, and of what it leaves"),
     "export": ("lfstereo.cli.export", "light field or raw capture to the format of another program"),
