@@ -72,10 +72,12 @@ def run(arguments: argparse.Namespace) -> int:
     means = summarise(rows)
     if arguments.output:
         _write_csv(arguments.output, [*rows, *means], arguments.force)
+    judged = "none" if network is None else f"{network.card.name}-v{network.card.version} {network.card.sha256[:12]}"
     if arguments.json:
-        print(json.dumps({"scenes": [asdict(row) for row in rows], "all": [asdict(row) for row in means]}, indent=2))
+        table = {"scenes": [asdict(row) for row in rows], "all": [asdict(row) for row in means]}
+        print(json.dumps({"model": judged.strip(), **table}, indent=2))
     else:
-        print(_table([*rows, *means], total))
+        print(f"model: {judged}\n{_table([*rows, *means], total)}")
     return 0
 
 

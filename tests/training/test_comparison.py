@@ -141,6 +141,7 @@ def test_held_out_scenes_as_a_table(
     monkeypatch.setattr(comparison, "texture_bank", lambda seed, count: np.full((2, 256, 256, 3), 0.5, np.float32))
     assert main(["evaluate", "--synthetic", "2", "--size", "64x96", "--aperture-ratio", "0.2"]) == 0
     printed = capsys.readouterr().out
+    assert printed.startswith("model: tiny-v1")
     assert "synthetic-000" in printed and "mean of 2 scenes" in printed
     for method in (*NETWORKS, EDOF, *BASELINES):
         assert printed.count(f"  {method}  ") == 3
