@@ -27,7 +27,9 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("capture", type=Path, help="LFR, LFP or RAW capture, or with --camera an image of its mosaic")
     parser.add_argument("--whites", type=Path, help="folder with the camera's white images, or one white image")
     parser.add_argument("--camera", help="camera of a mosaic stored as an image: lytro-f01 or lytro-illum")
-    parser.add_argument("-o", "--output", type=Path, required=True, help="light field to write (.h5)")
+    parser.add_argument(
+        "-o", "--output", type=Path, required=True, help="light field to write (.h5, or .mat for MATLAB)"
+    )
     parser.add_argument("--preview", type=Path, help="picture of the views and the grid (default: beside the output)")
     parser.add_argument("--config", type=Path, help="TOML file with options; the command line goes before it")
     parser.add_argument("--force", action="store_true", help="replace an output that exists")
@@ -48,10 +50,13 @@ def run(arguments: argparse.Namespace) -> int:
     options = _options(arguments)
 
     from lfstereo.lightfield.decoding import calibrate, check_method, views_from
+    from lfstereo.lightfield.interchange.formats import export_light_field
+    from lfstereo.lightfield.interchange.lftoolbox_mat import SUFFIX as MAT_SUFFIX
     from lfstereo.lightfield.lftoolbox import decode_as_lftoolbox
-    from lfstereo.lightfield.store import check_suffix, write_light_field
+    from lfstereo.lightfield.store import check_suffix
 
-    check_suffix(arguments.output)
+    if arguments.output.suffix.lower() != MAT_SUFFIX:
+        check_suffix(arguments.output)
     clock = StageClock(bars=sys.stderr.isatty() or not arguments.json)
     with clock.stage("read"):
         capture, white = _read(arguments)
@@ -64,7 +69,7 @@ def run(arguments: argparse.Namespace) -> int:
         else:
             light_field = views_from(capture, grid, shading, options, progress)
     with clock.stage("write"):
-        write_light_field(arguments.output, light_field, arguments.force)
+        export_light_field(arguments.output, light_field, force=arguments.force)
         _write_preview(preview, light_field, white or capture, grid, arguments.force)
     summary = _summary(light_field, grid, clock)
     print(json.dumps(summary, indent=2) if arguments.json else _text(summary, arguments.output, preview))

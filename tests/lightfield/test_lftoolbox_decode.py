@@ -177,6 +177,19 @@ def test_method_on_the_command_line_and_in_a_file(
     assert found.sampling is not None and found.sampling.view_step_px == pytest.approx(14.3 * 3**0.5 / 2 / 14, rel=1e-3)
 
 
+def test_straight_to_a_file_of_the_toolbox(tmp_path: Path, draw_frame: Callable[..., Any], white: Capture) -> None:
+    photo = draw_frame(scene=lambda x, y: 0.5 + 0.3 * np.sin(x / 20)).capture
+    write_capture(tmp_path / "MOD_0001.RAW", white)
+    write_capture(tmp_path / "photo.LFR", photo)
+    target = tmp_path / "photo__Decoded.mat"
+    whites = ["--whites", str(tmp_path / "MOD_0001.RAW")]
+    assert main(["decode", str(tmp_path / "photo.LFR"), *whites, "--method", "lftoolbox", "-o", str(target)]) == 0
+    expected = decode(photo, white, DecodeOptions(method="lftoolbox"))
+    found = read_light_field(target)
+    np.testing.assert_allclose(found.views, expected.views, atol=1e-7)  # not one code of 16 bits lost
+    assert found.sampling == expected.sampling
+
+
 def test_unknown_method_in_a_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "run.toml").write_text('[decode]\nmethod = "best"\n')
     words = ["decode", "photo.LFR", "--config", str(tmp_path / "run.toml"), "-o", str(tmp_path / "a.h5")]
