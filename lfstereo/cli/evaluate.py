@@ -87,6 +87,7 @@ def _cases(arguments: argparse.Namespace, height: int, width: int) -> tuple[int,
 
     from lfstereo.simulate.stack_dataset import list_dual_stacks, stack_folder
     from lfstereo.simulate.stereo_scenes import find_scenes
+    from lfstereo.simulate.synthesis import SplitOptions, frames_for_tests
     from lfstereo.training.comparison import dataset_cases, photographed_cases, synthetic_cases
     from lfstereo.training.evaluate import HELD_OUT_SEED
 
@@ -100,7 +101,8 @@ def _cases(arguments: argparse.Namespace, height: int, width: int) -> tuple[int,
             sources.append(dataset_cases(folder, names, dslr.noise, options if ratio else None, arguments.far_first))
             total += len(names)
         else:
-            scenes = find_scenes(folder, arguments.disparity_scale)
+            found = find_scenes(folder, arguments.disparity_scale)
+            scenes = frames_for_tests(found, options.near_px, SplitOptions(), dslr.seed)
             sources.append(photographed_cases(scenes, options, dslr))
             total += len(scenes)
     return total, chain.from_iterable(sources)

@@ -165,8 +165,9 @@ def read_picture(path: Path) -> Rgb:
 def read_disparity(path: Path, scale: float | None = None) -> tuple[Float32, Bool]:
     """Read a disparity map in px and where it is known.
 
-    PFM holds px, infinite where unknown. Grey pictures hold px times ``scale``, 0 where unknown; where ``scale`` is
-    not given: 16 bits are times 256 (KITTI), 8 bits as Middlebury publishes them, told by names and size.
+    PFM holds px, infinite or 0 where unknown; its sign, in which data sets differ for right views, is dropped. Grey
+    pictures hold px times ``scale``, 0 where unknown; where ``scale`` is not given: 16 bits are times 256 (KITTI),
+    8 bits as Middlebury publishes them, told by names and size.
 
     Raises
     ------

@@ -117,6 +117,17 @@ def parts_of(scenes: Sequence[SceneFiles], split: SplitOptions) -> list[Part]:
     return found
 
 
+def frames_for_tests(scenes: Sequence[SceneFiles], near_px: float, split: SplitOptions, seed: int) -> list[SceneFiles]:
+    """Return the scenes to test on: all, but of FlyingThings3D only what :func:`synthesize` would put into ``test``."""
+    chosen = [scene for scene in scenes if scene.part is None]
+    room = split.test
+    for i in np.random.default_rng(seed).permutation(len(scenes)):
+        if room and scenes[i].part == "test" and _largest(scenes[i]) < near_px:
+            chosen.append(scenes[i])
+            room -= 1
+    return chosen
+
+
 def _largest(files: SceneFiles) -> float:
     disparity, known = read_disparity(files.disparity, files.scale)
     return float(disparity[known].max()) if known.any() else 0.0

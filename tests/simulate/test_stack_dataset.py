@@ -14,8 +14,8 @@ from lfstereo.depth.pfm import write_pfm
 from lfstereo.errors import ConfigError, InputError, ShapeError
 from lfstereo.simulate.photograph import PhotographOptions
 from lfstereo.simulate.stack_dataset import list_dual_stacks, open_dataset, read_dual_stack, write_dual_stack
-from lfstereo.simulate.stereo_scenes import SceneFiles, StereoScene, read_scene
-from lfstereo.simulate.synthesis import SplitOptions, parts_of, photograph, synthesize
+from lfstereo.simulate.stereo_scenes import SceneFiles, StereoScene, find_scenes, read_scene
+from lfstereo.simulate.synthesis import SplitOptions, frames_for_tests, parts_of, photograph, synthesize
 from lfstereo.simulate.virtual_dslr import VirtualDslrOptions
 
 HEIGHT, WIDTH = 16, 24
@@ -144,6 +144,18 @@ def test_limits_of_the_split(tmp_path: Path) -> None:
 def test_the_papers_split() -> None:
     files = [SceneFiles(str(i), Path(), Path(), Path()) for i in range(910)]
     assert parts_of(files, SplitOptions()).count("test") == 160
+
+
+def test_frames_for_tests_are_those_that_a_data_set_would_hold(tmp_path: Path) -> None:
+    frames = {f"TEST/B/0000/*/000{i}": d for i, d in enumerate((30.0, 120.0, 40.0, 50.0))}
+    files = find_scenes(flying_things(tmp_path / "things", {**frames, "TRAIN/A/0000/*/0006": 20.0}))
+    chosen = [f.name for f in frames_for_tests(files, 100, SplitOptions(), 0)]
+    assert sorted(chosen) == ["B-0000-0000", "B-0000-0002", "B-0000-0003"]
+    split = SplitOptions(train=0, test=2)
+    written = synthesize(tmp_path / "out", files, FEW, QUICK, split).written
+    assert [f"test/{f.name}" for f in frames_for_tests(files, 100, split, 0)] == list(written)
+    plain = [SceneFiles("own", Path(), Path(), Path())]
+    assert frames_for_tests(plain, 100, SplitOptions(), 0) == plain
 
 
 def test_a_pair_of_your_own(tmp_path: Path) -> None:

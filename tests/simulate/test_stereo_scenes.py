@@ -72,6 +72,9 @@ def test_coded_disparities(tmp_path: Path) -> None:
         values, known = read_disparity(tmp_path / name)
         assert values[0].tolist() == expected
         assert known[0].tolist() == [False, True, True]
+    write_pfm(tmp_path / "right.pfm", np.float32([[-7, 0, np.inf]]))
+    values, known = read_disparity(tmp_path / "right.pfm")
+    assert values[0, 0] == 7 and known[0].tolist() == [True, False, False]
     assert read_disparity(tmp_path / "own.png", 255 / 100)[0][0, 2] == pytest.approx(100)
 
 
