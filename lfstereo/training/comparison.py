@@ -12,9 +12,10 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from lfstereo.arrays import Bool, Float32
+from lfstereo.arrays import Bool, Float32, Rgb
 from lfstereo.conventions import DISPARITY_RANGE_PX
 from lfstereo.depth.baselines import fill_from_background, sgbm, sgbm_wls
+from lfstereo.depth.disparity import DisparityMap
 from lfstereo.depth.metrics import score_disparity
 from lfstereo.focus.measures import depth_from_focus
 from lfstereo.network.encoding import decode, encode, exposure_of
@@ -100,8 +101,8 @@ def compare(case: DualStack, network: Network | None) -> list[Row]:
     plain = sgbm(case.sharp, case.sharp_right, near)
     rows.append(_row(case, BASELINES[0], plain.disparity, time.perf_counter() - started, plain.valid))
     started = time.perf_counter()
-    filled = fill_from_background(sgbm_wls(case.sharp, case.sharp_right, near))
-    rows.append(_row(case, BASELINES[1], filled.disparity, time.perf_counter() - started))
+    filled = _wls_filled(case.sharp, case.sharp_right, near)
+    rows.append(_row(case, BASELINES[1], filled.disparity, time.perf_counter() - started, filled.valid))
     started = time.perf_counter()
     focused = depth_from_focus(case.left)
     rows.append(_row(case, BASELINES[2], focused.disparity, time.perf_counter() - started))
@@ -156,9 +157,9 @@ def _network_rows(case: DualStack, network: Network) -> list[Row]:
         edof_right = network.module.edof(right)
     picture, other = (np.moveaxis(_cropped(t, height, width), 0, -1) for t in (found.edof_left, edof_right))
     started = time.perf_counter()
-    filled = fill_from_background(sgbm_wls(decode(picture, 1.0), decode(other, 1.0), float(foci[0])))
+    filled = _wls_filled(decode(picture, 1.0), decode(other, 1.0), float(foci[0]))
     seconds[WLS_ON_EDOF] = spent["edof"] + time.perf_counter() - started
-    rows.append(_row(case, WLS_ON_EDOF, filled.disparity, seconds[WLS_ON_EDOF]))
+    rows.append(_row(case, WLS_ON_EDOF, filled.disparity, seconds[WLS_ON_EDOF], filled.valid))
     psnr = psnr_db(picture, encode(case.sharp, exposure), case.known)
     return [*rows, Row(case.name, EDOF, None, None, None, None, None, None, None, spent["edof"] / 2, psnr)]
 
@@ -175,7 +176,15 @@ def psnr_db(picture: Float32, truth: Float32, counted: Bool) -> float:
     return -10 * math.log10(max(error, 1e-12))
 
 
+def _wls_filled(left: Rgb, right: Rgb, d_max: float) -> DisparityMap:
+    """Match and fill; a pair without a single match stays without answers."""
+    found = sgbm_wls(left, right, d_max)
+    return fill_from_background(found) if found.valid.any() else found
+
+
 def _row(case: DualStack, method: str, disparity: Float32, seconds: float, answered: Bool | None = None) -> Row:
+    if answered is not None and not (answered & case.known).any():
+        return Row(case.name, method, None, None, None, None, None, None, 0.0, seconds)
     scores = score_disparity(np.maximum(disparity, 0), case.disparity, case.known, answered)
     return Row(
         scene=case.name,

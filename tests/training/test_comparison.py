@@ -12,6 +12,7 @@ import pytest
 import torch
 
 from lfstereo.cli.main import main
+from lfstereo.depth.disparity import DisparityMap
 from lfstereo.depth.pfm import write_pfm
 from lfstereo.errors import ConfigError
 from lfstereo.focus.stack import FocalStack
@@ -81,6 +82,18 @@ def test_every_method_is_judged(case: DualStack, network: Network) -> None:
     assert rows["BDfF-Net"].seconds >= rows["Stereo-Net"].seconds > 0
     assert rows[EDOF].mae_px is None and rows[EDOF].psnr_db > 5
     assert rows["BDfF-Net"].mae_norm == pytest.approx(rows["BDfF-Net"].mae_px / 100)
+
+
+def test_a_pair_without_any_match_is_reported_as_unanswered(case: DualStack, monkeypatch: pytest.MonkeyPatch) -> None:
+    def nothing(left: np.ndarray, right: np.ndarray, d_max: float) -> DisparityMap:
+        return DisparityMap(np.zeros(left.shape[:2], np.float32), np.zeros(left.shape[:2], bool), left)
+
+    monkeypatch.setattr(comparison, "sgbm", nothing)
+    monkeypatch.setattr(comparison, "sgbm_wls", nothing)
+    rows = {row.method: row for row in compare(case, None)}
+    for method in BASELINES[:2]:
+        assert rows[method].density == 0 and rows[method].mae_px is rows[method].bad_2 is None
+    assert rows[BASELINES[2]].density == 100
 
 
 def test_the_network_rows_are_the_maps_of_the_network(
