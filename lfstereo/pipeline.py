@@ -41,6 +41,7 @@ class RunOptions:
     slices: int = option(SLICES_DEFAULT, "slices of each focal stack")
     model: str = option("bdffnet-r16-v1", "name of a shipped model, or its folder")
     device: Literal["auto", "cpu", "cuda"] = option("auto", "where the network runs")
+    any_zoom: bool = option(False, "accept captures at another zoom or focus than the rig was calibrated at")
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,7 +152,7 @@ def focus_side(
     step_m = view_baseline_m(light_field, camera)
     views_across = max(light_field.views.shape[:2])
     with clock.stage(f"rectify {side}") as progress:
-        rectified = rectify(light_field, rig, geometry, side, progress)
+        rectified = rectify(light_field, rig, geometry, side, progress, options.any_zoom)
     with clock.stage(f"focal stack {side}") as progress:
         stack = render_stack(
             rectified,

@@ -59,7 +59,7 @@ def seen_by(camera: PlenopticCamera, rotation: np.ndarray, translation: np.ndarr
         warp = enlarge @ matrix @ plane @ board_from_page
         large = cv2.warpPerspective(picture, warp, (width * FINE, height * FINE), borderValue=0.4)
         views[t, s] = cv2.resize(large, (width, height), interpolation=cv2.INTER_AREA)[..., None]
-    return LightField(views, None, None, camera.serial, name)
+    return LightField(views, None, None, camera.serial, name, zoom_step=105, focus_step=-6)
 
 
 @pytest.fixture(scope="module")
@@ -100,6 +100,7 @@ def test_photographs_become_a_rig_and_a_report(
     turn = Rotation.from_matrix(rig.right_from_left @ RIG.right_from_left.T).magnitude()
     assert turn < ROTATION_TOLERANCE_RAD
     assert rig.left.focus_distance_m == pytest.approx(0.85, rel=0.03)
+    assert (rig.left.zoom_step, rig.right.focus_step) == (105, -6)
     picture = cv2.imread(str(tmp_path / "rig.png"))
     assert picture.shape[1] == 1400 and picture.std() > 10
     assert main(words(photographs, output)) == 3

@@ -70,7 +70,7 @@ def run(arguments: argparse.Namespace) -> int:
         print(f"shot {name} left out: {reason}", file=sys.stderr)
     with clock.stage("solve") as progress:
         solution = solve_rig(session.pairs, target.points, session.sizes_px, session.pixel_px, options, progress)
-    write_rig(arguments.output, solution.rig, arguments.force)
+    write_rig(arguments.output, session.labelled(solution.rig), arguments.force)
     write_report(report, solution, target.points, arguments.force)
     summary = _summary(solution, session, clock)
     print(json.dumps(summary, indent=2) if arguments.json else _text(summary, arguments.output, report))

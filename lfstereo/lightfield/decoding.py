@@ -117,7 +117,13 @@ def views_from(
     progress(30, 100)
     views, weight = sample_views(image, shading, grid, sampling, count, _part(progress, 30, 100))
     return LightField(
-        views=views, weight=weight, sampling=sampling, serial=capture.metadata.serial, source=capture.source
+        views=views,
+        weight=weight,
+        sampling=sampling,
+        serial=capture.metadata.serial,
+        source=capture.source,
+        zoom_step=capture.metadata.lens.zoom_step,
+        focus_step=capture.metadata.lens.focus_step,
     )
 
 

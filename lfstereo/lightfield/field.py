@@ -36,6 +36,10 @@ class LightField:
     """Camera serial number, empty where unknown."""
     source: str
     """File or folder it came from, for messages."""
+    zoom_step: int | None = None
+    """State of the zoom lens as the camera wrote it; ``None`` where unknown."""
+    focus_step: int | None = None
+    """Likewise of its focus."""
 
     def __post_init__(self) -> None:
         check_shape(f"{self.source}: views", self.views, (None, None, None, None, 3))

@@ -131,6 +131,8 @@ def decode_as_lftoolbox(capture: Capture, white: Capture, grid: LensletGrid, pro
         sampling=AlignedLattice.of(grid).sampling(),
         serial=capture.metadata.serial,
         source=capture.source,
+        zoom_step=capture.metadata.lens.zoom_step,
+        focus_step=capture.metadata.lens.focus_step,
     )
 
 

@@ -22,6 +22,7 @@ FORMAT_VERSION = 1
 _ENCODING = "square root"
 _LARGEST_VALUES = 4 * 10**9
 _FOREIGN = {lftoolbox_mat.SUFFIX: lftoolbox_mat.read_decoded_mat, eslf.SUFFIX: eslf.read_eslf}
+_STEPS = ("zoom_step", "focus_step")
 _SAMPLING = {"origin_px": 2, "step_px": 2, "rotation_rad": 1, "view_step_px": 1}
 
 
@@ -93,6 +94,9 @@ def write_light_field(path: Path, light_field: LightField, force: bool = False) 
             file.create_dataset("weight", data=light_field.weight, chunks=chunks)
         file.attrs["format"], file.attrs["version"] = FORMAT_NAME, FORMAT_VERSION
         file.attrs["serial"], file.attrs["source"] = light_field.serial, light_field.source
+        for name in _STEPS:
+            if getattr(light_field, name) is not None:
+                file.attrs[name] = getattr(light_field, name)
         if light_field.sampling is not None:
             group = file.create_group("sampling")
             for name in _SAMPLING:
@@ -141,6 +145,8 @@ def _read(file: Any, path: Path) -> LightField:
         sampling=_sampling(file, path),
         serial=_text(file, "serial", path),
         source=str(path),
+        zoom_step=_step(file, "zoom_step", path),
+        focus_step=_step(file, "focus_step", path),
     )
 
 
@@ -185,6 +191,13 @@ def _sampling(file: Any, path: Path) -> ViewSampling | None:
         rotation_rad=values["rotation_rad"][0],
         view_step_px=values["view_step_px"][0],
     )
+
+
+def _step(file: Any, name: str, path: Path) -> int | None:
+    found = file.attrs.get(name)
+    if found is not None and not isinstance(found, int | np.integer):
+        raise ContainerError(f"{path}: '{name}' is {found!r}, expected a whole number; decode the capture again")
+    return None if found is None else int(found)
 
 
 def _text(file: Any, name: str, path: Path) -> str:

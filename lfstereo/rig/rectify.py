@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, TypeVar
 
 import cv2
@@ -128,7 +128,12 @@ def rectified_geometry(rig: StereoRig) -> RectifiedGeometry:
 
 
 def rectify(
-    light_field: LightField, rig: StereoRig, geometry: RectifiedGeometry, side: Side, progress: Progress = silent
+    light_field: LightField,
+    rig: StereoRig,
+    geometry: RectifiedGeometry,
+    side: Side,
+    progress: Progress = silent,
+    any_zoom: bool = False,
 ) -> LightField:
     """Resample one light field of the pair to its rectified camera.
 
@@ -142,6 +147,8 @@ def rectify(
         The decoded light field.
     side
         Which camera of the rig it comes from.
+    any_zoom
+        Accept light fields taken at another zoom or focus than the rig was calibrated at.
 
     Returns
     -------
@@ -151,12 +158,14 @@ def rectify(
     Raises
     ------
     AssetError
-        If the rig was made for another camera.
+        If the rig was made for another camera, or for another state of its lens.
     ShapeError
         If the light field does not cover the sensor that the rig speaks of.
     """
     camera = rig.left if side == "left" else rig.right
     _check_match(light_field, camera, side)
+    if not any_zoom:
+        _check_lens(light_field, camera, side)
     t_count, s_count = light_field.views.shape[:2]
     rows, columns = geometry.size
     views = np.empty((t_count, s_count, rows, columns, 3), np.float32)
@@ -171,7 +180,7 @@ def rectify(
         weight[t, s] = _resampled(confidence, *where, cv2.INTER_LINEAR)
         progress(index + 1, t_count * s_count)
     np.maximum(views, 0.0, out=views)
-    return LightField(views=views, weight=weight, sampling=None, serial=light_field.serial, source=light_field.source)
+    return replace(light_field, views=views, weight=weight, sampling=None)
 
 
 def view_baseline_m(light_field: LightField, camera: PlenopticCamera) -> float:
@@ -320,3 +329,14 @@ def _check_match(light_field: LightField, camera: PlenopticCamera, side: Side) -
             f"{light_field.source}: covers {covered[0]:.0f} x {covered[1]:.0f} px, but the rig's {side} camera has "
             f"{camera.sensor_px[0]} x {camera.sensor_px[1]}; give the rig of this camera"
         )
+
+
+def _check_lens(light_field: LightField, camera: PlenopticCamera, side: Side) -> None:
+    """Refuse another zoom or focus where both are known: focal length and plane of zero slope depend on them."""
+    for name in ("zoom", "focus"):
+        found, expected = getattr(light_field, f"{name}_step"), getattr(camera, f"{name}_step")
+        if found is not None and expected is not None and found != expected:
+            raise AssetError(
+                f"{light_field.source}: taken at {name} step {found}, but the rig's {side} camera was calibrated at "
+                f"{expected}; set the lens as it was, calibrate again, or accept it with --any-zoom"
+            )

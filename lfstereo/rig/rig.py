@@ -50,6 +50,10 @@ class PlenopticCamera:
     distortion: Five = (0.0, 0.0, 0.0, 0.0, 0.0)
     """k1, k2, k3, b1, b2: how the lens bends the ideal directions ``(x - cx)/fx``; see
     :func:`lfstereo.rig.distortion.distort`."""
+    zoom_step: int | None = None
+    """State of the zoom lens that this holds for, as the camera writes it; ``None``: not known."""
+    focus_step: int | None = None
+    """Likewise of its focus."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,7 +102,8 @@ def write_rig(path: Path, rig: StereoRig, force: bool = False) -> None:
     lines += [f"{name} = {toml_value(getattr(rig, name))}" for name in ("near_m", "far_m", "pixel_px")]
     for side, camera in (("left", rig.left), ("right", rig.right)):
         lines += ["", f"[{side}]"]
-        lines += [f"{name} = {toml_value(getattr(camera, name))}" for name in PlenopticCamera.__slots__]
+        values = [(name, getattr(camera, name)) for name in PlenopticCamera.__slots__]
+        lines += [f"{name} = {toml_value(value)}" for name, value in values if value is not None]
     lines += ["", "[right_from_left]", f"rotation_rad = {toml_value(rig.rotation_rad)}"]
     lines += [f"translation_m = {toml_value(rig.translation_m)}", ""]
     with atomic_file(path, force) as scratch:
@@ -155,7 +160,18 @@ def _camera(table: dict[str, Any], where: str) -> PlenopticCamera:
         focus_distance_m=_positive(table, "focus_distance_m", where),
         pupil_m_per_px=_positive(table, "pupil_m_per_px", where),
         distortion=(k1, k2, k3, b1, b2),
+        zoom_step=_step(table, "zoom_step", where),
+        focus_step=_step(table, "focus_step", where),
     )
+
+
+def _step(table: dict[str, Any], name: str, where: str) -> int | None:
+    found = table.get(name)
+    if found is not None and (isinstance(found, bool) or not isinstance(found, int)):
+        raise ConfigError(
+            f"{where}: {name} = {found!r}, expected a whole number; leave the line out if it is not known"
+        )
+    return found
 
 
 def _table(table: dict[str, Any], name: str, where: Path) -> dict[str, Any]:

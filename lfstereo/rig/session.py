@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from lfstereo.arrays import Float32
@@ -17,9 +17,12 @@ from lfstereo.lightfield.store import SUFFIXES, read_light_field
 from lfstereo.progress import Progress, silent
 from lfstereo.rig.bundle import ShotPair, SizePair
 from lfstereo.rig.corners import CornerOptions, find_corners
+from lfstereo.rig.rig import StereoRig
 from lfstereo.rig.sightings import Sightings, merge_views
 from lfstereo.rig.target import Target
 
+LensSteps = tuple[int | None, int | None]
+"""Zoom and focus."""
 _BLOCKS = 5
 """Views are averaged over this many blocks in both directions; see :func:`merge_views`."""
 
@@ -34,6 +37,16 @@ class Session:
     """Sensor px per px of a view."""
     unusable: tuple[tuple[str, str], ...]
     """Name of each shot without a target, and why."""
+    steps: tuple[LensSteps, LensSteps] = ((None, None), (None, None))
+    """Zoom and focus step of the left and the right camera, where the captures tell."""
+
+    def labelled(self, rig: StereoRig) -> StereoRig:
+        """Return the rig with the zoom and focus steps that it holds for."""
+        left, right = (
+            replace(camera, zoom_step=zoom, focus_step=focus)
+            for camera, (zoom, focus) in zip((rig.left, rig.right), self.steps, strict=True)
+        )
+        return replace(rig, left=left, right=right)
 
 
 def see_targets(
@@ -84,7 +97,13 @@ def see_targets(
             if unusable
             else "found no shots, expected photographs of the target by both cameras"
         )
-    return Session(tuple(pairs), (sides[0].size_px, sides[1].size_px), sides[0].pixel_px, tuple(unusable))
+    return Session(
+        pairs=tuple(pairs),
+        sizes_px=(sides[0].size_px, sides[1].size_px),
+        pixel_px=sides[0].pixel_px,
+        unusable=tuple(unusable),
+        steps=(sides[0].steps, sides[1].steps),
+    )
 
 
 def _refuse_one_camera(name: str, seen: Sequence[Sightings]) -> None:
@@ -106,19 +125,22 @@ class _Side:
     state: tuple[object, ...] = ()
     size_px: tuple[int, int] = (0, 0)
     pixel_px: float = 1.0
+    steps: LensSteps = (None, None)
     grids: dict[str, tuple[LensletGrid, Float32]] = field(default_factory=dict)
 
     def open(self, path: Path) -> LightField:
         if path.suffix.lower() in SUFFIXES:
             light_field = read_light_field(path)
-            self._agree(path, (light_field.serial, light_field.views.shape[2:4]))
+            self.steps = light_field.zoom_step, light_field.focus_step
+            self._agree(path, (light_field.serial, light_field.views.shape[2:4], *self.steps))
             rows, columns = light_field.views.shape[2:4]
             step = light_field.sampling.step_px if light_field.sampling else (1.0, 1.0)
             self.size_px, self.pixel_px = (round(columns * step[0]), round(rows * step[1])), step[1]
             return light_field
         capture = read_capture(path)
         found = capture.metadata
-        self._agree(path, (found.serial, (found.height, found.width), found.lens.zoom_step, found.lens.focus_step))
+        self.steps = found.lens.zoom_step, found.lens.focus_step
+        self._agree(path, (found.serial, (found.height, found.width), *self.steps))
         light_field = self._decoded(capture, path)
         self.size_px = (found.width, found.height)
         self.pixel_px = light_field.sampling.step_px[1] if light_field.sampling else 1.0

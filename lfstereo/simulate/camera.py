@@ -77,6 +77,16 @@ class SimulatedCamera:
         """Spacing of the micro-images over that of the lenslets: ``1 + g/D``."""
         return 1 + self.lenslet_gap_m / self.image_distance_m
 
+    @property
+    def zoom_step(self) -> int:
+        """State of the zoom lens as the camera writes it."""
+        return round(905 - 40e3 * self.focal_length_m)
+
+    @property
+    def focus_step(self) -> int:
+        """State of its focus as the camera writes it."""
+        return round(250 / self.focus_m - 300)
+
     def lattice(self) -> Float64:
         """Return ``(3, 2)``: origin, step along a row, step to the next row of the micro-image centres, (x, y) px.
 
@@ -119,6 +129,8 @@ class SimulatedCamera:
             focus_distance_m=self.focus_m,
             pupil_m_per_px=self.pupil_m_per_px,
             distortion=(self.distortion_k1, 0.0, 0.0, 0.0, 0.0),
+            zoom_step=self.zoom_step,
+            focus_step=self.focus_step,
         )
 
 

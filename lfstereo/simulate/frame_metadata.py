@@ -109,8 +109,8 @@ def _lens(camera: SimulatedCamera) -> MainLens:
     return MainLens(
         focal_length_m=camera.focal_length_m,
         f_number=camera.f_number,
-        zoom_step=round(905 - 40e3 * camera.focal_length_m),
-        focus_step=round(250 / camera.focus_m - 300),
+        zoom_step=camera.zoom_step,
+        focus_step=camera.focus_step,
         exit_pupil_offset_m=camera.image_distance_m,
         infinity_lambda=15.0,
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -47,6 +48,17 @@ def test_twice_stored_is_the_same(stored: Path, tmp_path: Path) -> None:
     once = read_light_field(stored)
     write_light_field(tmp_path / "again.h5", once)
     assert np.array_equal(read_light_field(tmp_path / "again.h5").views, once.views)
+
+
+def test_state_of_the_lens(stored: Path, tmp_path: Path, light_field: LightField) -> None:
+    assert (read_light_field(stored).zoom_step, read_light_field(stored).focus_step) == (None, None)
+    path = tmp_path / "zoomed.h5"
+    write_light_field(path, replace(light_field, zoom_step=982, focus_step=-5))
+    assert (read_light_field(path).zoom_step, read_light_field(path).focus_step) == (982, -5)
+    with h5py.File(path, "a") as file:
+        file.attrs["zoom_step"] = "far"
+    with pytest.raises(ContainerError, match="'zoom_step' is 'far', expected a whole number"):
+        read_light_field(path)
 
 
 def test_without_weight_and_sampling(tmp_path: Path, light_field: LightField) -> None:

@@ -149,6 +149,21 @@ def test_refuses_a_rig_for_another_camera() -> None:
         rectify(decoded(rig.right), rig, rectified_geometry(rig), "left")
 
 
+@pytest.mark.parametrize("name", ["zoom", "focus"])
+def test_refuses_another_state_of_the_lens(name: str) -> None:
+    camera = PlenopticCamera("", (40, 30), (50.0, 50.0), (19.5, 14.5), 1.0, 0.002, zoom_step=600, focus_step=-5)
+    rig = StereoRig(camera, camera, (0.0, 0.0, 0.0), (-0.02, 0.0, 0.0), 0.9, 1.1, 1.0)
+    geometry = rectified_geometry(rig)
+    unknown = LightField(np.zeros((3, 3, 30, 40, 3), np.float32), None, None, "", "views")
+    same = dataclasses.replace(unknown, zoom_step=600, focus_step=-5)
+    other = dataclasses.replace(same, **{f"{name}_step": 12})
+    for accepted in (unknown, same):
+        assert rectify(accepted, rig, geometry, "left").zoom_step == accepted.zoom_step
+    with pytest.raises(AssetError, match=f"views: taken at {name} step 12, but the rig's left .* --any-zoom"):
+        rectify(other, rig, geometry, "left")
+    rectify(other, rig, geometry, "left", any_zoom=True)
+
+
 def test_refuses_a_light_field_of_another_size() -> None:
     rig = toed_in_rig()
     small = LightField(np.zeros((3, 3, 30, 40, 3), np.float32), None, None, "", "small")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 
 import pytest
@@ -48,6 +49,16 @@ def test_says_what_is_wrong(rig_file: Path, find: str, replace: str, message: st
         read_rig(rig_file)
     assert str(rig_file) in str(caught.value)
     assert "\n" not in str(caught.value).replace(str(rig_file), "")
+
+
+def test_zoom_and_focus(rig_file: Path) -> None:
+    assert read_rig(rig_file).left.zoom_step is None, "files without them are read"
+    rig = dataclasses.replace(RIG, right=dataclasses.replace(CAMERA, zoom_step=982, focus_step=-5))
+    write_rig(rig_file, rig, force=True)
+    assert read_rig(rig_file) == rig
+    rig_file.write_text(rig_file.read_text().replace("zoom_step = 982", "zoom_step = 98.2"))
+    with pytest.raises(ConfigError, match=r"zoom_step = 98\.2, expected a whole number"):
+        read_rig(rig_file)
 
 
 def test_missing_file(tmp_path: Path) -> None:
