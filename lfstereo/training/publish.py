@@ -26,9 +26,9 @@ DATA = (
     "no photograph, no other data set"
 )
 DEVIATIONS = (
-    "Stereo-Net: siamese features and a group-wise correlation volume over 0 to 104 px in place of the concatenated "
-    "images, hourglasses at 1/4 of the resolution, expected bin and a refinement; the concatenation learns no matching "
-    "in the training time available",
+    "Stereo-Net: siamese features and a volume over 0 to 104 px in place of the concatenated images, half of it learned "
+    "group-wise correlation, half fixed normalised cross-correlation of the images; hourglasses at 1/4 of the resolution, "
+    "expected bin and a refinement; the concatenation learns no matching in the training time available",
     "Focus-Net: a focus volume (shared weights per slice, expected slice) in place of four branches over the "
     "concatenated slices, for the same reason",
     "EDoF-Net, Focus-Net-Guided, BDfF-Net: convolutions as published, added to the mean slice or the incoming map",
@@ -39,7 +39,7 @@ DEVIATIONS = (
 LIMITS = (
     "16 slices, evenly spaced, focus disparities within -1 to 104 px",
     "aperture ratio D/B of 0.05 to 0.4 in training, mostly 0.08 to 0.2",
-    "trained on a processor for about an hour, on rendered scenes only: expect errors of several px on thin objects, "
+    "trained on a processor for under two hours, on rendered scenes only: expect errors of several px on thin objects, "
     "plain surfaces, reflections, and where the left view sees what the right one does not",
 )
 
