@@ -209,6 +209,19 @@ def test_rig_of_other_cameras(pair: Path, tmp_path: Path, capsys: pytest.Capture
     assert "B5143909630" in refused(capsys, arguments)
 
 
+def test_rig_of_another_zoom(pair: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    rig = tmp_path / "rig.toml"
+    text = (pair / "rig.toml").read_text().replace("SIM00000002", "B5143909630")
+    assert "zoom_step = 105" in text
+    rig.write_text(text.replace("zoom_step = 105", "zoom_step = 106"))
+    arguments = words(pair, tmp_path / "out")
+    arguments[arguments.index("--rig") + 1] = str(rig)
+    assert "left.LFR: taken at zoom step 105, but the rig's left" in refused(capsys, arguments)
+    assert "the rig's right camera is B5143909630" in refused(capsys, [*arguments, "--any-zoom"]), (
+        "the left is accepted"
+    )
+
+
 def test_light_fields_of_different_size(pair: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     from lfstereo.lightfield.field import LightField
     from lfstereo.lightfield.store import read_light_field, write_light_field
