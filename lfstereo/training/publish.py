@@ -26,9 +26,9 @@ DATA = (
     "no photograph, no other data set"
 )
 DEVIATIONS = (
-    "Stereo-Net: siamese features and a volume over 0 to 104 px in place of the concatenated images, half of it learned "
-    "group-wise correlation, half fixed normalised cross-correlation of the images; hourglasses at 1/4 of the resolution, "
-    "expected bin and a refinement; the concatenation learns no matching in the training time available",
+    "Stereo-Net: siamese features and a volume over 0 to 104 px in place of the concatenated images, half of it "
+    "learned group-wise correlation, half fixed normalised cross-correlation of the images; hourglasses at 1/4 of the "
+    "resolution, expected bin and a refinement; the concatenation learns no matching in the training time available",
     "Focus-Net: a focus volume (shared weights per slice, expected slice) in place of four branches over the "
     "concatenated slices, for the same reason",
     "EDoF-Net, Focus-Net-Guided, BDfF-Net: convolutions as published, added to the mean slice or the incoming map",
