@@ -18,7 +18,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from lfstereo.arrays import Float64
-from lfstereo.errors import ConfigError
+from lfstereo.errors import ConfigError, RigError
 from lfstereo.options import option
 from lfstereo.outputs import atomic_file
 from lfstereo.rig.pinhole import PinholeCamera, lens_of, pinhole_of
@@ -72,7 +72,7 @@ def export_rig(path: Path, rig: StereoRig, name: RigFormat, force: bool = False)
     OutputError
         If the file exists and ``force`` is not set, or cannot be written.
     RigError
-        If the lenses bend rays as the format cannot tell.
+        If the lenses bend rays as the format cannot tell, or the sensors differ in size and it has one size.
     """
     if name == "toml":
         write_rig(path, rig, force)
@@ -143,6 +143,11 @@ def _json(rig: StereoRig) -> str:
 
 
 def _opencv(rig: StereoRig) -> str:
+    if rig.left.sensor_px != rig.right.sensor_px:
+        raise RigError(
+            f"rig: the sensors have {rig.left.sensor_px} and {rig.right.sensor_px} px, expected one size for an OpenCV "
+            "file; write it as Kalibr's or as JSON"
+        )
     file = cv2.FileStorage("rig.yml", cv2.FILE_STORAGE_WRITE | cv2.FILE_STORAGE_MEMORY)
     file.writeComment("lfstereo rig: centre views only; px of the raw sensor, m, X2 = R X1 + T", False)
     for number, camera in enumerate((rig.left, rig.right), 1):

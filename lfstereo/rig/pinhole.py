@@ -73,7 +73,7 @@ def pinhole_of(camera: PlenopticCamera, terms: int = 3) -> PinholeCamera:
         If the lens bends rays as the other model cannot, by over 1 sensor px somewhere in the frame.
     """
     k1, k2, k3, b1, b2 = camera.distortion
-    start = np.array([*camera.focal_px, *camera.principal_px, k1, k2, -k1 * b2, -k1 * b1, k3])
+    start = np.array([*camera.focal_px, *camera.principal_px, k1, k2, -k1 * b2, -k1 * b1, k3]) + 0.0  # No -0.
     free = np.ones(9, np.bool_)
     free[8] = terms > 2
     start[8] *= terms > 2

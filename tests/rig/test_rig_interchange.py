@@ -178,6 +178,13 @@ def test_refuses_lenses_that_the_model_cannot_tell(tmp_path: Path) -> None:
         import_rig(tmp_path / "rig.yml", PART)
 
 
+def test_opencv_has_one_picture_size(tmp_path: Path) -> None:
+    other = dataclasses.replace(RIG, right=dataclasses.replace(RIGHT, sensor_px=(3280, 3280)))
+    with pytest.raises(RigError, match="expected one size"):
+        export_rig(tmp_path / "rig.yml", other, "opencv")
+    export_rig(tmp_path / "rig.yaml", other, "kalibr")
+
+
 def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     write_rig(tmp_path / "rig.toml", RIG)
     assert main(["rig", str(tmp_path / "rig.toml"), "-o", str(tmp_path / "rig.yml")]) == 0
