@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
+import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from lfstereo.container import Capture
+from lfstereo.container.mosaic_image import read_camera_profile
+from lfstereo.container.packing import unpack
 from lfstereo.errors import RigError, ShapeError
+from lfstereo.lenslet.grid import LensletGrid
+from lfstereo.lightfield import lftoolbox as decoder
 from lfstereo.lightfield.field import LightField
 from lfstereo.rig.lftoolbox import ToolboxIntrinsics, rectify_as_lftoolbox, requested_intrinsics, resample_rays
 
@@ -36,6 +43,40 @@ def test_equals_the_light_field_toolbox(
     assert np.mean(error > 1e-5) < 0.06
     assert np.sqrt(np.mean(error**2)) < 0.34 * CODE, "rounding of the result alone gives 0.289"
     assert np.array_equal(found[..., 3] > 0.5 * CODE, reference[..., 3] > 0)
+
+
+def test_equals_the_light_field_toolbox_from_unrounded_samples(
+    toolbox: tuple[np.ndarray, ToolboxIntrinsics, np.ndarray, np.ndarray],
+    real_data: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Of the weight, which this package can decode without rounding; what is left differs already in the decode."""
+    _, measured, requested, reference = toolbox
+    folder = real_data / "lftoolbox_reference" / "crop600"
+    metadata = replace(read_camera_profile("lytro-illum"), width=600, height=600)
+    photo, white = (
+        Capture(unpack((folder / name).read_bytes(), 600, 600, 10, "little", name), metadata, name)
+        for name in ("lenslet.raw", "white.raw")
+    )
+    model = json.loads((folder / "grid_model.json").read_text())
+    cos, sin = np.cos(model["Rot"]), np.sin(model["Rot"])
+    grid = LensletGrid(
+        origin_px=(model["HOffset"] - 1, model["VOffset"] - 1),
+        step_u_px=(model["HSpacing"] * cos, model["HSpacing"] * sin),
+        step_v_px=(-model["VSpacing"] * sin, model["VSpacing"] * cos),
+        first_shifted_row=int(model["FirstPosShiftRow"]) - 1,
+        rows=int(model["VMax"]),
+        columns=int(model["UMax"]),
+        sensor_shape=(600, 600),
+        residual_px=0.0,
+        quality=1.0,
+        source="given",
+    )
+    monkeypatch.setattr(decoder, "_quantise", lambda values: None)
+    _, weight = decoder.sample_as_lftoolbox(photo, white, grid)
+    error = np.abs(resample_rays(weight[..., None], measured, requested)[..., 0] - reference[..., 3])
+    assert np.mean(error > 1e-5) < 1e-3
+    assert np.sqrt(np.mean(error**2)) < 0.29 * CODE
 
 
 def test_default_target_is_the_toolbox_s(
