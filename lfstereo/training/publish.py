@@ -14,11 +14,12 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from lfstereo.errors import ConfigError
-from lfstereo.network.bdff_net import Architecture, BdffNet
+from lfstereo.network.bdff_net import Architecture, BdffNet, paper_architecture
 from lfstereo.network.card import LICENCE, Metric, ModelCard, Training
 from lfstereo.network.weights import load_model, save_model
 from lfstereo.training.checkpoint import FOLDER, Counters, read_weights
 from lfstereo.training.evaluate import BAD_PX, HELD_OUT_SEED, edof_mae, evaluate, held_out
+from lfstereo.training.recipe import read_recipe
 from lfstereo.training.stages import PARTS
 
 DATA = (
@@ -45,7 +46,12 @@ LIMITS = (
 
 
 def publish(
-    sources: dict[str, Path], folder: Path, stages: Sequence[Path], device: str, force: bool = False
+    sources: dict[str, Path],
+    folder: Path,
+    stages: Sequence[Path],
+    device: str,
+    architecture: Architecture = Architecture(),
+    force: bool = False,
 ) -> ModelCard:
     """Assemble and write a model.
 
@@ -59,6 +65,8 @@ def publish(
         Run folders, in order, for the training story.
     device
         What the training ran on, in words.
+    architecture
+        Widths and variants that the runs were made with.
     force
         Replace an existing folder.
 
@@ -72,7 +80,7 @@ def publish(
     name, dash, version = folder.name.rpartition("-v")
     if not dash or not version.isdigit():
         raise ConfigError(f"{folder}: expected a name such as bdffnet-r16-v1, ending in a version")
-    network = BdffNet(Architecture())
+    network = BdffNet(architecture)
     state = network.state_dict()
     for part, run in sources.items():
         state.update({key: value for key, value in read_weights(run).items() if key.startswith(part + ".")})
@@ -85,7 +93,8 @@ def publish(
         date=datetime.now(UTC).date().isoformat(),
         stages=tuple(f"{c.stage}: {c.step} steps, {c.elapsed_s / 60:.1f} min" for c in counters),
     )
-    card = ModelCard(name, int(version), LICENCE, "", DEVIATIONS, LIMITS, network.architecture, story)
+    deviations = () if architecture == paper_architecture() else DEVIATIONS
+    card = ModelCard(name, int(version), LICENCE, "", deviations, LIMITS, network.architecture, story)
     return save_model(folder, network, card, force)
 
 
@@ -127,11 +136,13 @@ def main(words: Sequence[str] | None = None) -> int:
     parser.add_argument("-o", "--output", type=Path, required=True)
     parser.add_argument("--stages", nargs="*", type=Path, default=[], help="run folders, for the training story")
     parser.add_argument("--device", default="processor")
+    parser.add_argument("--recipe", type=Path, help="recipe with the runs' [architecture]; default: the shipped one")
     parser.add_argument("--measure", type=int, default=0, metavar="N", help="measure on N held-out scenes for the card")
     parser.add_argument("--force", action="store_true")
     arguments = parser.parse_args(words)
     sources = {part: Path(run) for part, _, run in (text.partition("=") for text in arguments.parts)}
-    publish(sources, arguments.output, arguments.stages, arguments.device, arguments.force)
+    architecture = read_recipe(arguments.recipe)[1] if arguments.recipe else Architecture()
+    publish(sources, arguments.output, arguments.stages, arguments.device, architecture, arguments.force)
     if arguments.measure:
         measure(arguments.output, arguments.measure)
     return 0
