@@ -59,7 +59,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.output:
         check_absent(arguments.output, arguments.force)
     from lfstereo.network.estimate import load_network
-    from lfstereo.network.weights import DEFAULT_MODEL
+    from lfstereo.network.shipped import DEFAULT_MODEL
     from lfstereo.training.comparison import compare, summarise
 
     total, cases = _cases(arguments, height, width)

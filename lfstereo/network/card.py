@@ -12,7 +12,6 @@ from lfstereo.errors import AssetError, ConfigError
 from lfstereo.network.bdff_net import Architecture
 from lfstereo.options import from_mapping, read_toml, to_toml
 
-CARD = "card.toml"
 LICENCE = "BSD-3-Clause"
 
 

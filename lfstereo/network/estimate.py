@@ -18,8 +18,9 @@ from lfstereo.network.bdff_net import BdffNet
 from lfstereo.network.blocks import channels_last, fold_batch_norms
 from lfstereo.network.card import ModelCard
 from lfstereo.network.encoding import decode, encode, exposure_of
+from lfstereo.network.shipped import DEFAULT_MODEL, find_model
 from lfstereo.network.stereo_net import SEARCH_PX
-from lfstereo.network.weights import DEFAULT_MODEL, find_model, load_model
+from lfstereo.network.weights import load_model
 from lfstereo.progress import Progress, silent
 
 LOWEST_PX = -1.0

@@ -15,32 +15,13 @@ from safetensors.torch import load as parse
 from safetensors.torch import save as serialise
 from torch import Tensor
 
-from lfstereo.assets import asset_folder
 from lfstereo.errors import AssetError
 from lfstereo.network.bdff_net import BdffNet
-from lfstereo.network.card import CARD, ModelCard, read_card, write_card
+from lfstereo.network.card import ModelCard, read_card, write_card
+from lfstereo.network.shipped import CARD, WEIGHTS
 from lfstereo.outputs import atomic_folder
 
-WEIGHTS = "weights.safetensors"
-DEFAULT_MODEL = "bdffnet-r16-v1"
-"""The model used where none is named."""
 _COUNTER = "num_batches_tracked"
-
-
-def find_model(name: str | Path) -> Path:
-    """Return the folder of a model: a shipped one by name, any other by path.
-
-    Raises
-    ------
-    AssetError
-        If there is neither.
-    """
-    shipped = asset_folder("models")
-    for folder in (shipped / name, Path(name)):
-        if (folder / CARD).is_file():
-            return folder
-    known = sorted(card.parent.name for card in shipped.glob(f"*/{CARD}"))
-    raise AssetError(f"model '{name}': neither a shipped model nor a folder with {CARD}; shipped are {known}")
 
 
 def save_model(folder: Path, network: BdffNet, card: ModelCard, force: bool = False) -> ModelCard:

@@ -10,8 +10,9 @@ from safetensors.torch import load_file, save_file
 
 from lfstereo.errors import AssetError, OutputError
 from lfstereo.network.bdff_net import Architecture, BdffNet
-from lfstereo.network.card import CARD, Metric, ModelCard, Training, read_card, write_card
-from lfstereo.network.weights import DEFAULT_MODEL, WEIGHTS, find_model, load_model, save_model
+from lfstereo.network.card import Metric, ModelCard, Training, read_card, write_card
+from lfstereo.network.shipped import CARD, DEFAULT_MODEL, WEIGHTS, find_model
+from lfstereo.network.weights import load_model, save_model
 
 SMALL = Architecture(focus_width=4, edof_width=4, tail_width=4, stereo_width=16)
 HALF_PRECISION = 1e-3  # relative, of a float16 weight
