@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal, TypeAlias
 
 import numpy as np
 
@@ -30,6 +31,9 @@ from lfstereo.rig.rectify import (
     view_baseline_m,
 )
 from lfstereo.rig.rig import StereoRig
+
+if TYPE_CHECKING:
+    from lfstereo.network.estimate import Network
 
 CAPTURE_SUFFIXES = (".lfr", ".lfp", ".raw")
 
@@ -67,6 +71,19 @@ class PairResult:
     weights_sha256: str
 
 
+@dataclass(frozen=True, slots=True)
+class FocusedPair:
+    """Both cameras' focal stacks, ready for the network."""
+
+    left: SideResult
+    right: SideResult
+    geometry: RectifiedGeometry
+
+
+Opener: TypeAlias = Callable[[Path, Progress], LightField]
+"""Turns a capture into a light field."""
+
+
 def run_pair(
     left: Path, right: Path, rig: StereoRig, whites: Path | None, options: RunOptions, clock: StageClock
 ) -> PairResult:
@@ -89,18 +106,40 @@ def run_pair(
         If a lenslet grid or the rig's geometry cannot be trusted.
     """
     with clock.stage("load network"):
-        from lfstereo.network.estimate import estimate_disparity, load_network
+        from lfstereo.network.estimate import load_network
 
         network = load_network(options.model, options.device)
+    check_slices(options, network)
+
+    def opened(path: Path, progress: Progress) -> LightField:
+        return open_light_field(path, whites, progress)
+
+    return match_pair(focus_pair(left, right, rig, opened, options, clock), network, clock)
+
+
+def check_slices(options: RunOptions, network: Network) -> None:
+    """Refuse a number of slices that the network was not made for.
+
+    Raises
+    ------
+    ConfigError
+        If the two differ.
+    """
     wanted = network.module.architecture.slices
     if options.slices != wanted:
         raise ConfigError(f"slices = {options.slices}, expected {wanted}, what {options.model} was made for")
+
+
+def focus_pair(
+    left: Path, right: Path, rig: StereoRig, opened: Opener, options: RunOptions, clock: StageClock
+) -> FocusedPair:
+    """Decode both captures, rectify them and render their focal stacks; as in :func:`run_pair`."""
     geometry = rectified_geometry(rig)
     sides: dict[Side, SideResult] = {}
     shape: tuple[int, ...] | None = None
     for side, path in (("left", left), ("right", right)):
         with clock.stage(f"decode {side}") as progress:
-            light_field = open_light_field(path, whites, progress)
+            light_field = opened(path, progress)
         if shape is not None and light_field.views.shape != shape:
             raise ShapeError(
                 f"{path}: light field of {light_field.views.shape}, but {left} has {shape}; decode both the same way"
@@ -108,15 +147,22 @@ def run_pair(
         shape = light_field.views.shape
         sides[side] = focus_side(light_field, rig, geometry, side, options, clock)  # type: ignore[index,arg-type]
         del light_field
+    return FocusedPair(left=sides["left"], right=sides["right"], geometry=geometry)
+
+
+def match_pair(focused: FocusedPair, network: Network, clock: StageClock) -> PairResult:
+    """Let the network find the disparity of a pair of focal stacks; valid is what both cameras see."""
+    from lfstereo.network.estimate import estimate_disparity
+
+    left, right = focused.left, focused.right
     with clock.stage("disparity") as progress:
-        found = estimate_disparity(sides["left"].stack, sides["right"].stack, network, progress)
-    valid = found.valid & common_field(found.disparity, sides["left"].seen, sides["right"].seen)
-    found = DisparityMap(disparity=found.disparity, valid=valid, all_in_focus=found.all_in_focus)
+        found = estimate_disparity(left.stack, right.stack, network, progress)
+    valid = found.valid & common_field(found.disparity, left.seen, right.seen)
     return PairResult(
-        map=found,
-        left=sides["left"],
-        right=sides["right"],
-        geometry=geometry,
+        map=DisparityMap(disparity=found.disparity, valid=valid, all_in_focus=found.all_in_focus),
+        left=left,
+        right=right,
+        geometry=focused.geometry,
         weights_sha256=network.card.sha256,
     )
 

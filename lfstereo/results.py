@@ -102,16 +102,28 @@ def write_results(
     OutputError
         If the folder exists and ``force`` is not set, or it cannot be written.
     """
+    with atomic_folder(folder, force) as out:
+        return fill_folder(out, result, inputs, options, clock, truth)
+
+
+def fill_folder(
+    out: Path,
+    result: PairResult,
+    inputs: Inputs,
+    options: RunOptions,
+    clock: StageClock,
+    truth: DisparityTruth | None = None,
+) -> Report:
+    """Write the files of a result folder into an empty folder; as in :func:`write_results`."""
     depth = _depth(result, result.map.disparity, result.map.valid)
     errors = truth_errors(result, truth) if truth else {}
-    with atomic_folder(folder, force) as out:
-        with clock.stage("write results"):
-            points = _write_maps(out, result, depth)
-            for side, part in (("left", result.left), ("right", result.right)):
-                write_png(out / f"centre_{side}.png", srgb8(part.centre_view))
-                _write_stack(out / f"focal_stack_{side}", part.stack)
-        report = _summary(result, depth, points, clock, errors)
-        (out / "run.toml").write_text(_run_toml(report, result, inputs, options), "utf-8")
+    with clock.stage("write results"):
+        points = _write_maps(out, result, depth)
+        for side, part in (("left", result.left), ("right", result.right)):
+            write_png(out / f"centre_{side}.png", srgb8(part.centre_view))
+            _write_stack(out / f"focal_stack_{side}", part.stack)
+    report = _summary(result, depth, points, clock, errors)
+    (out / "run.toml").write_text(_run_toml(report, result, inputs, options), "utf-8")
     return report
 
 
@@ -236,7 +248,7 @@ def _run_toml(report: Report, result: PairResult, inputs: Inputs, options: RunOp
         "versions": {"lfstereo": __version__, "python": platform.python_version()}
         | {name: metadata.version(name) for name in _PACKAGES},
         "inputs": {"left": inputs.left.name, "right": inputs.right.name, "rig": inputs.rig.name},
-        "sha256": {"left": _sha256(inputs.left), "right": _sha256(inputs.right), "rig": _sha256(inputs.rig)}
+        "sha256": {"left": sha256_of(inputs.left), "right": sha256_of(inputs.right), "rig": sha256_of(inputs.rig)}
         | {"weights": result.weights_sha256},
         "geometry": {
             "focal_px": geometry.focal_px,
@@ -265,7 +277,7 @@ def _key(name: str) -> str:
     return name if name.replace("_", "").replace("-", "").isalnum() else toml_value(name)
 
 
-def _sha256(path: Path) -> str:
+def sha256_of(path: Path) -> str:
     """Return the sha256 of a file, or of the names and contents of a folder's files."""
     digest = hashlib.sha256()
     for file in [path] if path.is_file() else sorted(p for p in path.rglob("*") if p.is_file()):
