@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from lfstereo.arrays import Mosaic
@@ -63,7 +63,7 @@ def read_capture(path: Path) -> Capture:
     section = frame_section(container, "imageRef")
     metadata = read_metadata(container)
     check_raw_size(section.length, metadata, str(path))
-    return _capture(container.read(section), metadata, str(path))
+    return unpack_capture(container.read(section), metadata, str(path))
 
 
 def check_raw_size(found: int, metadata: FrameMetadata, where: str) -> None:
@@ -99,7 +99,9 @@ def read_metadata(container: Container) -> FrameMetadata:
         named = "privateMetadataRef" in inline
         private = read_json(container, frame_section(container, "privateMetadataRef")) if named else None
     public = public | {"parameters": entry.get("parameters", {})}
-    return parse_metadata(public, private if isinstance(private, dict) else None, str(container.path))
+    metadata = parse_metadata(public, private if isinstance(private, dict) else None, str(container.path))
+    geometry = inline.get("geometryCorrectionRef")
+    return replace(metadata, geometry_ref=geometry.lower()) if isinstance(geometry, str) else metadata
 
 
 def read_sidecar(path: Path) -> FrameMetadata:
@@ -138,10 +140,17 @@ def _read_bare(path: Path) -> Capture:
         data = path.read_bytes()
     except OSError as error:
         raise ContainerError(f"{path}: cannot be read ({error.strerror}); give the path of a RAW file") from error
-    return _capture(data, metadata, str(path))
+    return unpack_capture(data, metadata, str(path))
 
 
-def _capture(data: bytes, metadata: FrameMetadata, source: str) -> Capture:
+def unpack_capture(data: bytes, metadata: FrameMetadata, source: str) -> Capture:
+    """Unpack the bytes of a raw frame.
+
+    Raises
+    ------
+    ContainerError
+        If there are more or fewer than the frame takes by its metadata.
+    """
     m = metadata
     mosaic = unpack(data, m.width, m.height, m.bits_per_pixel, m.endianness, source)
     return Capture(mosaic=mosaic, metadata=metadata, source=source)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from lfstereo.container.fields import Fields, Json
 from lfstereo.errors import MetadataError
@@ -78,6 +78,8 @@ class FrameMetadata:
     """Colour temperature that the camera's white balance found, kelvin."""
     exposure_s: float | None = None
     """Exposure time of a pixel, seconds."""
+    geometry_ref: str = field(default="", compare=False)
+    """The factory's name of the white image that the camera itself chose for a picture; empty where not told."""
 
 
 EXIT_PUPIL_AT_INFINITY_M = 10000.0

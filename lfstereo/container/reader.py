@@ -82,7 +82,7 @@ def read_json(container: Container, section: Section) -> Json:
 
 
 def parse_json(data: bytes, where: str) -> Json:
-    """Parse a JSON object.
+    """Parse a JSON object; zero bytes after its end, as in some cameras' text files, are passed over.
 
     Raises
     ------
@@ -90,7 +90,7 @@ def parse_json(data: bytes, where: str) -> Json:
         If the bytes are not UTF-8, not JSON, or JSON of another kind.
     """
     try:
-        value = json.loads(data.decode("utf-8-sig"))
+        value = json.loads(data.rstrip(b"\0").decode("utf-8-sig"))
     except RecursionError as error:
         raise ContainerError(f"{where}: found JSON nested too deeply, expected metadata; {_COPY_AGAIN}") from error
     except ValueError as error:
