@@ -26,7 +26,8 @@ if TYPE_CHECKING:
     from lfstereo.lightfield.store import read_light_field, write_light_field
     from lfstereo.network.estimate import estimate_disparity, load_network
     from lfstereo.pipeline import run_pair
-    from lfstereo.rig.rectify import rectified_geometry, rectify
+    from lfstereo.rig.geometry import rectified_geometry
+    from lfstereo.rig.rectify import rectify
     from lfstereo.rig.rig import read_rig
 
 _PUBLIC = {
@@ -38,7 +39,7 @@ _PUBLIC = {
     "read_capture": "container",
     "read_light_field": "lightfield.store",
     "read_rig": "rig.rig",
-    "rectified_geometry": "rig.rectify",
+    "rectified_geometry": "rig.geometry",
     "rectify": "rig.rectify",
     "refocus": "focus.refocus",
     "render_stack": "focus.refocus",

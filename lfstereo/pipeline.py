@@ -22,15 +22,10 @@ from lfstereo.lightfield.field import LightField
 from lfstereo.lightfield.store import read_light_field
 from lfstereo.options import option
 from lfstereo.progress import Progress, StageClock, silent
-from lfstereo.rig.rectify import (
-    RectifiedGeometry,
-    Side,
-    field_of_view,
-    rectified_geometry,
-    rectify,
-    view_baseline_m,
-)
+from lfstereo.rig.geometry import RectifiedGeometry, Side, rectified_geometry
+from lfstereo.rig.rectify import field_of_view, rectify
 from lfstereo.rig.rig import StereoRig
+from lfstereo.rig.view_maps import common_view_baseline_m
 
 if TYPE_CHECKING:
     from lfstereo.network.estimate import Network
@@ -46,6 +41,7 @@ class RunOptions:
     model: str = option("bdffnet-r16-v1", "name of a shipped model, or its folder")
     device: Literal["auto", "cpu", "cuda"] = option("auto", "where the network runs")
     any_zoom: bool = option(False, "accept captures at another zoom or focus than the rig was calibrated at")
+    any_camera: bool = option(False, "accept captures of cameras with other serial numbers than the rig's")
 
 
 @dataclass(frozen=True, slots=True)
@@ -195,10 +191,10 @@ def focus_side(
     camera = rig.left if side == "left" else rig.right
     t0, s0 = light_field.centre
     seen = field_of_view(light_field, camera, geometry, side)
-    step_m = view_baseline_m(light_field, camera)
+    step_m = common_view_baseline_m(light_field, rig)
     views_across = max(light_field.views.shape[:2])
     with clock.stage(f"rectify {side}") as progress:
-        rectified = rectify(light_field, rig, geometry, side, progress, options.any_zoom)
+        rectified = rectify(light_field, rig, geometry, side, progress, options.any_zoom, options.any_camera)
     with clock.stage(f"focal stack {side}") as progress:
         stack = render_stack(
             rectified,

@@ -12,7 +12,7 @@ from lfstereo.outputs import check_absent
 from lfstereo.pipeline import RunOptions, run_pair
 from lfstereo.progress import StageClock
 from lfstereo.results import Inputs, Report, read_truth, write_results
-from lfstereo.rig.rectify import rectified_geometry
+from lfstereo.rig.geometry import rectified_geometry
 from lfstereo.rig.rig import read_rig
 
 

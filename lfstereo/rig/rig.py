@@ -22,6 +22,18 @@ Five = tuple[float, float, float, float, float]
 
 
 @dataclass(frozen=True, slots=True)
+class SensorGrid:
+    """How the rows of micro-images lay on the sensor while a camera was calibrated."""
+
+    origin_px: Pair
+    """(x, y) of the first micro-image's centre."""
+    step_px: Pair
+    """Row pitch of a regular hexagonal lattice of the micro-images' pitch, and the row pitch found."""
+    rotation_rad: float
+    """Of the rows on the sensor, x towards y."""
+
+
+@dataclass(frozen=True, slots=True)
 class PlenopticCamera:
     """One light-field camera in front of its main lens: a pinhole per point of the pupil.
 
@@ -54,6 +66,8 @@ class PlenopticCamera:
     """State of the zoom lens that this holds for, as the camera writes it; ``None``: not known."""
     focus_step: int | None = None
     """Likewise of its focus."""
+    grid: SensorGrid | None = None
+    """The lattice of micro-images; ``None``: not known."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,8 +116,11 @@ def write_rig(path: Path, rig: StereoRig, force: bool = False) -> None:
     lines += [f"{name} = {toml_value(getattr(rig, name))}" for name in ("near_m", "far_m", "pixel_px")]
     for side, camera in (("left", rig.left), ("right", rig.right)):
         lines += ["", f"[{side}]"]
-        values = [(name, getattr(camera, name)) for name in PlenopticCamera.__slots__]
+        values = [(name, getattr(camera, name)) for name in PlenopticCamera.__slots__ if name != "grid"]
         lines += [f"{name} = {toml_value(value)}" for name, value in values if value is not None]
+        if camera.grid is not None:
+            lines += ["", f"[{side}.grid]"]
+            lines += [f"{name} = {toml_value(getattr(camera.grid, name))}" for name in SensorGrid.__slots__]
     lines += ["", "[right_from_left]", f"rotation_rad = {toml_value(rig.rotation_rad)}"]
     lines += [f"translation_m = {toml_value(rig.translation_m)}", ""]
     with atomic_file(path, force) as scratch:
@@ -162,7 +179,19 @@ def _camera(table: dict[str, Any], where: str) -> PlenopticCamera:
         distortion=(k1, k2, k3, b1, b2),
         zoom_step=_step(table, "zoom_step", where),
         focus_step=_step(table, "focus_step", where),
+        grid=_grid(table, where),
     )
+
+
+def _grid(table: dict[str, Any], where: str) -> SensorGrid | None:
+    if "grid" not in table:
+        return None
+    found, where = _table(table, "grid", where), f"{where[:-1]}.grid]"
+    x, y = _numbers(found, "origin_px", 2, where)
+    step_x, step_y = _numbers(found, "step_px", 2, where)
+    if min(step_x, step_y) <= 0:
+        raise ConfigError(f"{where}: step_px = {found['step_px']}, expected positive numbers")
+    return SensorGrid((x, y), (step_x, step_y), _numbers(found, "rotation_rad", 1, where)[0])
 
 
 def _step(table: dict[str, Any], name: str, where: str) -> int | None:
@@ -174,7 +203,7 @@ def _step(table: dict[str, Any], name: str, where: str) -> int | None:
     return found
 
 
-def _table(table: dict[str, Any], name: str, where: Path) -> dict[str, Any]:
+def _table(table: dict[str, Any], name: str, where: Path | str) -> dict[str, Any]:
     value = table.get(name)
     if not isinstance(value, dict):
         raise ConfigError(f"{where}: the table [{name}] is missing; give a complete rig file")

@@ -17,7 +17,7 @@ from lfstereo.lightfield.store import SUFFIXES, read_light_field
 from lfstereo.progress import Progress, silent
 from lfstereo.rig.bundle import ShotPair, SizePair
 from lfstereo.rig.corners import CornerOptions, find_corners
-from lfstereo.rig.rig import StereoRig
+from lfstereo.rig.rig import SensorGrid, StereoRig
 from lfstereo.rig.sightings import Sightings, merge_views
 from lfstereo.rig.target import Target
 
@@ -39,12 +39,14 @@ class Session:
     """Name of each shot without a target, and why."""
     steps: tuple[LensSteps, LensSteps] = ((None, None), (None, None))
     """Zoom and focus step of the left and the right camera, where the captures tell."""
+    grids: tuple[SensorGrid | None, SensorGrid | None] = (None, None)
+    """The lattice of micro-images of the first shot of either camera."""
 
     def labelled(self, rig: StereoRig) -> StereoRig:
-        """Return the rig with the zoom and focus steps that it holds for."""
+        """Return the rig with the zoom and focus steps and the lattices of micro-images that it holds for."""
         left, right = (
-            replace(camera, zoom_step=zoom, focus_step=focus)
-            for camera, (zoom, focus) in zip((rig.left, rig.right), self.steps, strict=True)
+            replace(camera, zoom_step=zoom, focus_step=focus, grid=grid)
+            for camera, (zoom, focus), grid in zip((rig.left, rig.right), self.steps, self.grids, strict=True)
         )
         return replace(rig, left=left, right=right)
 
@@ -103,6 +105,7 @@ def see_targets(
         pixel_px=sides[0].pixel_px,
         unusable=tuple(unusable),
         steps=(sides[0].steps, sides[1].steps),
+        grids=(sides[0].grid, sides[1].grid),
     )
 
 
@@ -126,9 +129,16 @@ class _Side:
     size_px: tuple[int, int] = (0, 0)
     pixel_px: float = 1.0
     steps: LensSteps = (None, None)
+    grid: SensorGrid | None = None
     grids: dict[str, tuple[LensletGrid, Float32]] = field(default_factory=dict)
 
     def open(self, path: Path) -> LightField:
+        light_field = self._opened(path)
+        if self.grid is None and (sampling := light_field.sampling) is not None:
+            self.grid = SensorGrid(sampling.origin_px, sampling.step_px, sampling.rotation_rad)
+        return light_field
+
+    def _opened(self, path: Path) -> LightField:
         if path.suffix.lower() in SUFFIXES:
             light_field = read_light_field(path)
             self.steps = light_field.zoom_step, light_field.focus_step

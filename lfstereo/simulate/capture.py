@@ -7,7 +7,7 @@ import numpy as np
 from lfstereo.arrays import Float64
 from lfstereo.container import Capture
 from lfstereo.progress import Progress, silent
-from lfstereo.rig.rectify import Side
+from lfstereo.rig.geometry import Side
 from lfstereo.simulate.frame_metadata import picture_metadata, white_metadata
 from lfstereo.simulate.options import SimulateOptions
 from lfstereo.simulate.rigs import SimulatedRig

@@ -9,7 +9,7 @@ from lfstereo.container import write_capture
 from lfstereo.options import to_toml, toml_value
 from lfstereo.outputs import atomic_folder
 from lfstereo.progress import Progress, silent
-from lfstereo.rig.rectify import Side
+from lfstereo.rig.geometry import Side
 from lfstereo.rig.rig import write_rig
 from lfstereo.rig.target import write_target
 from lfstereo.simulate.boards import BoardPose, board_scene, board_target, draw_poses

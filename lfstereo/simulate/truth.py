@@ -12,7 +12,7 @@ from lfstereo.arrays import Bool, Disparity, Float32, Float64, Rgb
 from lfstereo.depth.pfm import write_pfm
 from lfstereo.depth.pictures import write_png
 from lfstereo.lightfield.encoding import srgb8
-from lfstereo.rig.rectify import RectifiedGeometry, Side, rectified_geometry
+from lfstereo.rig.geometry import RectifiedGeometry, Side, rectified_geometry
 from lfstereo.rig.rig import PlenopticCamera, StereoRig
 from lfstereo.simulate.pinhole import Pinhole, depth, render, visible
 from lfstereo.simulate.scene import Scene

@@ -10,9 +10,11 @@ import pytest
 
 from lfstereo.errors import ConfigError
 from lfstereo.lightfield.field import LightField, ViewSampling
+from lfstereo.rig.geometry import rectified_geometry
 from lfstereo.rig.intrinsics import plenoptic_rays, project
-from lfstereo.rig.rectify import field_of_view, rectified_geometry, rectify, view_baseline_m, view_homography, view_map
+from lfstereo.rig.rectify import field_of_view, rectify
 from lfstereo.rig.rig import PlenopticCamera, StereoRig, read_rig, write_rig
+from lfstereo.rig.view_maps import view_baseline_m, view_homography, view_map
 
 BEND = (-0.3, 0.4, 0.1, 0.01, -0.02)
 LEFT = PlenopticCamera("L", (1300, 900), (2500.0, 2510.0), (655.0, 447.0), 0.85, 7e-4, BEND)

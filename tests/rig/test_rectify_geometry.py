@@ -10,8 +10,10 @@ import pytest
 
 from lfstereo.errors import AssetError, RigError, ShapeError
 from lfstereo.lightfield.field import LightField, ViewSampling
-from lfstereo.rig.rectify import RectifiedGeometry, Side, rectified_geometry, rectify, view_baseline_m, view_homography
-from lfstereo.rig.rig import PlenopticCamera, StereoRig
+from lfstereo.rig.geometry import RectifiedGeometry, Side, rectified_geometry
+from lfstereo.rig.rectify import rectify
+from lfstereo.rig.rig import PlenopticCamera, SensorGrid, StereoRig
+from lfstereo.rig.view_maps import common_view_baseline_m, view_baseline_m, view_homography
 
 VIEWS = 5
 VIEW_STEP_PX = 2.0
@@ -147,6 +149,52 @@ def test_refuses_a_rig_for_another_camera() -> None:
     rig = toed_in_rig()
     with pytest.raises(AssetError, match=r"B5152102610.*B5143909630"):
         rectify(decoded(rig.right), rig, rectified_geometry(rig), "left")
+
+
+def test_another_camera_can_be_accepted() -> None:
+    rig = toed_in_rig()
+    field = dataclasses.replace(decoded(rig.right), views=np.zeros((1, 1, 434, 625, 3), np.float32))
+    assert rectify(field, rig, rectified_geometry(rig), "left", any_camera=True).serial == rig.right.serial
+
+
+@pytest.mark.parametrize(("stretch", "turn"), [(1.001, 0.0), (1.0, 0.001)])
+def test_refuses_another_lattice_of_micro_images(stretch: float, turn: float) -> None:
+    grid = SensorGrid((6.4, 5.1), (12.372 * stretch, 12.376 * stretch), -5.4e-4 + turn)
+    rig = toed_in_rig()
+    rig = dataclasses.replace(rig, left=dataclasses.replace(rig.left, grid=grid))
+    field = dataclasses.replace(decoded(rig.left), views=np.zeros((1, 1, 434, 625, 3), np.float32))
+    geometry = rectified_geometry(rig)
+    with pytest.raises(AssetError, match=r"a\.h5: rows of micro-images 12\.3760 px apart .* --any-zoom"):
+        rectify(field, rig, geometry, "left")
+    rectify(field, rig, geometry, "left", any_zoom=True)
+    same = dataclasses.replace(grid, step_px=(12.372, 12.376), rotation_rad=-5.4e-4)
+    accepting = dataclasses.replace(rig, left=dataclasses.replace(rig.left, grid=same))
+    rectify(field, accepting, geometry, "left")
+
+
+@pytest.mark.parametrize("side", ["left", "right"])
+@pytest.mark.parametrize("weighted", [False, True])
+def test_both_sides_have_one_slope_per_disparity(side: Side, weighted: bool) -> None:
+    left = PlenopticCamera("", (60, 40), (50.0, 50.0), (29.5, 19.5), 1.0, 0.002)
+    right = dataclasses.replace(left, pupil_m_per_px=0.0024)
+    rig = StereoRig(left, right, (0.0, 0.0, 0.0), (-0.02, 0.0, 0.0), 0.4, 1.6, 1.0)
+    geometry = rectified_geometry(rig)
+    own = left if side == "left" else right
+    slope_px = 50.0 * own.pupil_m_per_px * (1 / 0.5 - 1 / 1.0)
+    t, s, row, column, _ = np.meshgrid(*[np.arange(n) for n in (5, 5, 40, 60, 3)], indexing="ij")
+    # The plane at 0.5 m is painted with its own column, then with its own row.
+    views = np.where(np.arange(3) == 0, column + slope_px * (s - 2), row + slope_px * (t - 2)).astype(np.float32)
+    weight = np.full(views.shape[:4], 200, np.uint8) if weighted else None
+    found = rectify(LightField(views, weight, None, "", "plane"), rig, geometry, side)
+    field = LightField(views, None, None, "", "plane")
+    common = 50.0 * common_view_baseline_m(field, rig) * (1 / 0.5 - 1 / 1.0)
+    a, b = geometry.slope_from_disparity(common_view_baseline_m(field, rig))
+    assert common == pytest.approx(a * (50.0 * 0.02 / 0.5 - geometry.doffs_px) + b)
+    inside = (slice(None), slice(None), slice(10, 30), slice(20, 40))
+    moved = found.views[inside] - found.views[2, 2][inside[2:]]
+    assert moved[..., 0] == pytest.approx(common * (s - 2)[inside][..., 0], abs=1e-3)
+    assert moved[..., 1] == pytest.approx(common * (t - 2)[inside][..., 0], abs=1e-3)
+    assert found.weight is not None and (found.weight[inside] == (200 if weighted else 255)).all()
 
 
 @pytest.mark.parametrize("name", ["zoom", "focus"])

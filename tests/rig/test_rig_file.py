@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from lfstereo.errors import ConfigError
-from lfstereo.rig.rig import PlenopticCamera, StereoRig, read_rig, write_rig
+from lfstereo.rig.rig import PlenopticCamera, SensorGrid, StereoRig, read_rig, write_rig
 
 CAMERA = PlenopticCamera("B5143909630", (7728, 5368), (14630.5, 14634.25), (3860.0, 2690.5), 0.85, 7.1e-4)
 RIG = StereoRig(CAMERA, CAMERA, (0.0, 0.11, 0.001), (-0.0947, 0.001, 0.0052), 0.6, 1.2, 12.372)
@@ -58,6 +58,16 @@ def test_zoom_and_focus(rig_file: Path) -> None:
     assert read_rig(rig_file) == rig
     rig_file.write_text(rig_file.read_text().replace("zoom_step = 982", "zoom_step = 98.2"))
     with pytest.raises(ConfigError, match=r"zoom_step = 98\.2, expected a whole number"):
+        read_rig(rig_file)
+
+
+def test_lattice_of_micro_images(rig_file: Path) -> None:
+    grid = SensorGrid((1.5, 0.25), (12.375, 12.3715), -5.4e-4)
+    rig = dataclasses.replace(RIG, right=dataclasses.replace(CAMERA, grid=grid))
+    write_rig(rig_file, rig, force=True)
+    assert read_rig(rig_file) == rig
+    rig_file.write_text(rig_file.read_text().replace("step_px = [12.375", "step_px = [-12.375"))
+    with pytest.raises(ConfigError, match=r"\[right\.grid\]: step_px = \[-12\.375.* expected positive numbers"):
         read_rig(rig_file)
 
 

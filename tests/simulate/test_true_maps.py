@@ -7,7 +7,7 @@ import pytest
 
 from lfstereo.conventions import depth_from_disparity
 from lfstereo.depth.pfm import read_pfm
-from lfstereo.rig.rectify import rectified_geometry
+from lfstereo.rig.geometry import rectified_geometry
 from lfstereo.simulate.options import SimulateOptions
 from lfstereo.simulate.primitives import PATCH
 from lfstereo.simulate.rigs import SimulatedRig, build_rig
