@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -24,6 +24,15 @@ def real_data() -> Path:
     folder = Path(named)
     assert folder.is_dir(), f"LFSTEREO_DATA={named} is no folder"
     return folder
+
+
+@pytest.fixture(autouse=True, scope="session")
+def home(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """Folder for imported white images and cached results, so that tests leave the user's alone."""
+    folder = tmp_path_factory.mktemp("home")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("LFSTEREO_HOME", str(folder))
+        yield folder
 
 
 @dataclass(frozen=True)
