@@ -152,7 +152,7 @@ def test_raw_captures_need_white_images_and_one_zoom(monkeypatch: pytest.MonkeyP
     with pytest.raises(AssetError, match=r"1\.LFR: a raw capture needs the camera's white images"):
         see_targets([("1", tmp_path / "1.LFR", tmp_path / "1.LFR")], TARGET, None)
     blank = types.SimpleNamespace(sampling=None)
-    monkeypatch.setattr(session._Side, "_decoded", lambda *_: blank)
+    monkeypatch.setattr(session.ShotSide, "_decoded", lambda *_: blank)
     shots = [(n, tmp_path / f"{n}.LFR", tmp_path / f"{n}.LFR") for n in ("1", "2")]
     with pytest.raises(AssetError, match=r"2\.LFR: zoom step 2, expected 1 as .*1\.LFR"):
         see_targets(shots, TARGET, None)

@@ -1,4 +1,4 @@
-"""``lfstereo calibrate``: photographs of a target by both cameras to a rig."""
+"""``lfstereo calibrate``: photographs of a target by both cameras to a rig; drift of a rig from other captures."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from lfstereo.progress import StageClock
 
 if TYPE_CHECKING:
     from lfstereo.rig.bundle import RigSolution
+    from lfstereo.rig.drift import Drift
     from lfstereo.rig.session import Session
 
 
@@ -24,14 +25,29 @@ def configure(parser: argparse.ArgumentParser) -> None:
     from lfstereo.rig.bundle import RigOptions
     from lfstereo.rig.corners import CornerOptions
 
-    parser.add_argument("left", type=Path, help="folder with the left camera's photographs of the target")
-    parser.add_argument("right", type=Path, help="folder with the right camera's; may be the same")
-    parser.add_argument("--target", type=Path, required=True, help="TOML file of the target")
+    parser.add_argument(
+        "captures",
+        type=Path,
+        nargs="+",
+        help="folders with the left and with the right camera's photographs of the target, may be one; with --refine "
+        "captures of any scene, left and right in turn, or two folders",
+    )
+    parser.add_argument("--target", type=Path, help="TOML file of the target")
+    parser.add_argument(
+        "--refine",
+        type=Path,
+        metavar="RIG",
+        help="say whether this rig has moved, from ordinary captures, not a target",
+    )
     parser.add_argument("--whites", type=Path, help="folder with the cameras' white images; needed for raw captures")
     parser.add_argument(
-        "-o", "--output", type=Path, required=True, help="rig file to write (.toml), a report beside it"
+        "-o", "--output", type=Path, help="rig file to write (.toml), a report beside it; not needed with --refine"
     )
     parser.add_argument("--drop", nargs="+", default=[], metavar="NAME", help="shots to leave out, by name")
+    parser.add_argument(
+        "--any-zoom", action="store_true", help="with --refine: accept captures at another zoom or focus"
+    )
+    parser.add_argument("--any-camera", action="store_true", help="with --refine: accept captures of other cameras")
     parser.add_argument("--config", type=Path, help="TOML file with options; the command line goes before it")
     parser.add_argument("--force", action="store_true", help="replace outputs that exist")
     parser.add_argument("--json", action="store_true", help="print the summary as JSON on stdout")
@@ -41,6 +57,10 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the command."""
+    return _refine(arguments) if arguments.refine else _calibrate(arguments)
+
+
+def _calibrate(arguments: argparse.Namespace) -> int:
     from lfstereo.rig.bundle import RigOptions, solve_rig
     from lfstereo.rig.calibration_report import write_report
     from lfstereo.rig.corners import CornerOptions
@@ -49,6 +69,13 @@ def run(arguments: argparse.Namespace) -> int:
     from lfstereo.rig.shots import pair_shots
     from lfstereo.rig.target import read_target
 
+    if arguments.target is None or arguments.output is None:
+        raise ConfigError("calibrate: found no --target or no -o, expected both to calibrate, or --refine RIG")
+    if len(arguments.captures) > 2:
+        raise ConfigError(
+            f"calibrate: found {len(arguments.captures)} folders, expected the left camera's photographs and the right "
+            "camera's; for captures of other scenes give --refine"
+        )
     report = arguments.output.with_suffix(".png")
     check_absent(arguments.output, arguments.force)
     check_absent(report, arguments.force)
@@ -56,13 +83,7 @@ def run(arguments: argparse.Namespace) -> int:
     options = from_arguments(RigOptions, arguments, tables.get("rig", {}), f"{arguments.config} [rig]")
     corners = from_arguments(CornerOptions, arguments, tables.get("corners", {}), f"{arguments.config} [corners]")
     target = read_target(arguments.target)
-    shots = pair_shots(arguments.left, arguments.right)
-    unknown = set(arguments.drop) - {name for name, *_ in shots}
-    if unknown:
-        raise ConfigError(
-            f"--drop: found no shot {', '.join(sorted(unknown))}, expected some of {', '.join(n for n, *_ in shots)}"
-        )
-    shots = [shot for shot in shots if shot[0] not in arguments.drop]
+    shots = _without(pair_shots(arguments.captures[0], arguments.captures[-1]), arguments.drop)
     clock = StageClock(bars=sys.stderr.isatty() or not arguments.json)
     with clock.stage("find the target") as progress:
         session = see_targets(shots, target, arguments.whites, corners, progress)
@@ -75,6 +96,86 @@ def run(arguments: argparse.Namespace) -> int:
     summary = _summary(solution, session, clock)
     print(json.dumps(summary, indent=2) if arguments.json else _text(summary, arguments.output, report))
     return 0
+
+
+def _without(shots: list[tuple[str, Path, Path]], drop: list[str]) -> list[tuple[str, Path, Path]]:
+    unknown = set(drop) - {name for name, *_ in shots}
+    if unknown:
+        raise ConfigError(
+            f"--drop: found no shot {', '.join(sorted(unknown))}, expected some of {', '.join(n for n, *_ in shots)}"
+        )
+    return [shot for shot in shots if shot[0] not in drop]
+
+
+def _refine(arguments: argparse.Namespace) -> int:
+    from lfstereo.rig.drift import estimate_drift
+    from lfstereo.rig.features import join_matches, match_features
+    from lfstereo.rig.geometry import rectified_geometry
+    from lfstereo.rig.match import check_camera, check_lens
+    from lfstereo.rig.rig import read_rig, write_rig
+    from lfstereo.rig.session import ShotSide
+    from lfstereo.rig.shots import pair_captures
+
+    if arguments.output is not None:
+        check_absent(arguments.output, arguments.force)
+    rig = read_rig(arguments.refine)
+    geometry = rectified_geometry(rig)
+    shots = _without(pair_captures(arguments.captures), arguments.drop)
+    sides = (ShotSide("left", arguments.whites), ShotSide("right", arguments.whites))
+    clock = StageClock(bars=sys.stderr.isatty() or not arguments.json)
+    parts = []
+    with clock.stage("match features") as progress:
+        for done, (_, *paths) in enumerate(shots):
+            fields = [side.open(path) for side, path in zip(sides, paths, strict=True)]
+            for field, side in zip(fields, sides, strict=True):
+                camera = rig.left if side.name == "left" else rig.right
+                check_camera(field, camera, side.name, arguments.any_camera)
+                if not arguments.any_zoom:
+                    check_lens(field, camera, side.name)
+            parts.append(match_features(fields[0], fields[1], rig, geometry))
+            progress(done + 1, len(shots))
+    drift = estimate_drift(rig, join_matches(parts))
+    if arguments.output is not None:
+        write_rig(arguments.output, drift.rig, arguments.force)
+    summary = _drift_summary(drift, len(shots), clock)
+    print(json.dumps(summary, indent=2) if arguments.json else _drift_text(summary, arguments.output))
+    return 0
+
+
+def _drift_summary(drift: Drift, captures: int, clock: StageClock) -> dict[str, Any]:
+    return {
+        "moved": drift.moved,
+        "captures": captures,
+        "matches": drift.matches,
+        "rotation_rad": drift.rotation_rad.tolist(),
+        "rotation_sd_rad": drift.rotation_sd_rad.tolist(),
+        "height_m": drift.height_m,
+        "height_sd_m": drift.height_sd_m,
+        "row_parallax_px": [drift.parallax_before_px, drift.parallax_px],
+        "moved_px": drift.moved_px,
+        "seconds": clock.seconds,
+    }
+
+
+def _drift_text(summary: dict[str, Any], output: Path | None) -> str:
+    turns = ", ".join(
+        f"{math.degrees(turn):+.4f} +- {math.degrees(sd):.4f}"
+        for turn, sd in zip(summary["rotation_rad"], summary["rotation_sd_rad"], strict=True)
+    )
+    before, after = summary["row_parallax_px"]
+    verdict = "the rig has MOVED since its calibration" if summary["moved"] else "the rig has not moved"
+    lines = [
+        f"{verdict}: rows of {summary['matches']} features in {summary['captures']} pair(s) of captures are off by "
+        f"{summary['moved_px']:.3f} px rms (scatter {after:.3f} px)",
+        f"right camera turned about x, y, z by {turns} degrees, lower by {summary['height_m'] * 1e3:+.3f} +- "
+        f"{summary['height_sd_m'] * 1e3:.3f} mm",
+        f"vertical parallax {before:.3f} px rms with the rig as it was, {after:.3f} px as it is now",
+    ]
+    if output is not None:
+        lines.append(f"rig as it is now: {output}")
+    elif summary["moved"]:
+        lines.append("write the rig as it is now with -o, or calibrate again")
+    return "\n".join(lines)
 
 
 def _summary(solution: RigSolution, session: Session, clock: StageClock) -> dict[str, Any]:

@@ -66,7 +66,7 @@ def find_corners(
     the refinement.
     """
     t0, s0 = light_field.centre
-    number, centre = find_board(_grey(light_field, t0, s0), target, light_field.source)
+    number, centre = find_board(grey_view(light_field, t0, s0), target, light_field.source)
     reach = _window(centre, number, target)
     t_count, s_count = light_field.views.shape[:2]
     order = sorted(np.ndindex(t_count, s_count), key=lambda ts: (max(abs(ts[0] - t0), abs(ts[1] - s0)), ts))
@@ -79,7 +79,7 @@ def find_corners(
         sure = _confidence(light_field, t, s, guess, reach)
         usable = sure >= options.least_weight
         if np.count_nonzero(usable) >= min(_LEAST_CORNERS, len(number)):
-            found = _refined(_grey(light_field, t, s), guess, reach)
+            found = _refined(grey_view(light_field, t, s), guess, reach)
             good = usable & (np.hypot(*(found - guess).T) < max(2 * options.agree_px, 0.25 * reach))
             places[t, s, good], weight[t, s, good] = found[good], sure[good]
             motion.add(offset, found, good)
@@ -206,7 +206,7 @@ def _confidence(light_field: LightField, t: int, s: int, place: Float64, reach: 
     return sure
 
 
-def _grey(light_field: LightField, t: int, s: int) -> UInt8:
+def grey_view(light_field: LightField, t: int, s: int) -> UInt8:
     """Return one view in grey, square root of the light: edges keep their middle, noise is even."""
     light = np.clip(light_field.views[t, s] @ np.array([0.25, 0.5, 0.25], np.float32), 0, None)
     white = float(np.percentile(light, 99.5)) or 1.0

@@ -17,6 +17,7 @@ from lfstereo.lightfield.store import SUFFIXES, read_light_field
 from lfstereo.progress import Progress, silent
 from lfstereo.rig.bundle import ShotPair, SizePair
 from lfstereo.rig.corners import CornerOptions, find_corners
+from lfstereo.rig.geometry import Side
 from lfstereo.rig.rig import SensorGrid, StereoRig
 from lfstereo.rig.sightings import Sightings, merge_views
 from lfstereo.rig.target import Target
@@ -77,7 +78,7 @@ def see_targets(
     TargetNotFoundError
         If no shot shows the target to both cameras.
     """
-    sides = (_Side("left", whites), _Side("right", whites))
+    sides = (ShotSide("left", whites), ShotSide("right", whites))
     pairs, unusable = [], []
     for done, (name, *paths) in enumerate(shots):
         seen: list[Sightings] = []
@@ -119,10 +120,10 @@ def _refuse_one_camera(name: str, seen: Sequence[Sightings]) -> None:
 
 
 @dataclass(slots=True)
-class _Side:
+class ShotSide:
     """One camera's shots: the state that they must share, and grids already fitted."""
 
-    name: str
+    name: Side
     whites: Path | None
     first: str = ""
     state: tuple[object, ...] = ()
@@ -133,6 +134,13 @@ class _Side:
     grids: dict[str, tuple[LensletGrid, Float32]] = field(default_factory=dict)
 
     def open(self, path: Path) -> LightField:
+        """Decode a capture, or read a light field.
+
+        Raises
+        ------
+        AssetError
+            If a raw capture comes without white images, or another state of the camera than the first one.
+        """
         light_field = self._opened(path)
         if self.grid is None and (sampling := light_field.sampling) is not None:
             self.grid = SensorGrid(sampling.origin_px, sampling.step_px, sampling.rotation_rad)

@@ -43,6 +43,24 @@ def pair_shots(left: Path, right: Path) -> list[tuple[str, Path, Path]]:
     return [(name, named[0][name], named[1][name]) for name in sorted(named[0])]
 
 
+def pair_captures(paths: list[Path]) -> list[tuple[str, Path, Path]]:
+    """Return (name, left capture, right capture) of captures given left and right in turn, or of two folders.
+
+    Raises
+    ------
+    AssetError
+        If a capture has no partner, or a file is missing.
+    """
+    if paths[0].is_dir() and paths[-1].is_dir() and len(paths) <= 2:
+        return pair_shots(paths[0], paths[-1])
+    missing = [path for path in paths if not path.is_file()]
+    if missing:
+        raise AssetError(f"{missing[0]}: found no such file, expected captures, left and right in turn, or two folders")
+    if len(paths) % 2:
+        raise AssetError(f"{paths[-1]}: found {len(paths)} captures, expected left and right in turn; give pairs")
+    return [(left.stem, left, right) for left, right in zip(paths[::2], paths[1::2], strict=True)]
+
+
 def _captures(folder: Path, side: str) -> list[Path]:
     if not folder.is_dir():
         raise AssetError(f"{folder}: found no such folder, expected the {side} camera's photographs of the target")
