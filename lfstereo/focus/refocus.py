@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from lfstereo.arrays import Float32, Float64
 from lfstereo.conventions import DISPARITY_RANGE_PX, SLICES_DEFAULT
-from lfstereo.errors import InputError, ShapeError
+from lfstereo.errors import ConfigError, InputError, ShapeError
 from lfstereo.focus.aperture import RefocusOptions, aperture_weights, blur_ratio
 from lfstereo.focus.stack import FocalStack
 from lfstereo.lightfield.field import LightField
 from lfstereo.progress import Progress, silent
 
 _ROWS_PER_REPORT = 128
-_LEAST_WEIGHT = 1e-4
-"""Summed weight, in fully trusted views, below which a slice shows the centre view instead of a quotient."""
 
 
 def slice_disparities(d_max: float = DISPARITY_RANGE_PX, d_min: float = 0.0, count: int = SLICES_DEFAULT) -> Float32:
@@ -98,20 +97,21 @@ def refocus(
 ) -> Float32:
     """Return the pictures that a lens of the light field's aperture takes when focused at each slope.
 
-    A picture is the mean over the views of ``I_ts(x - slope (s - s0), y - slope (t - t0))``, linearly
-    interpolated and weighted by the aperture and by the confidence of each sample; a sample outside its
-    view has no weight. A pixel that no weight reaches shows the centre view.
+    A picture is the mean over the views of ``I_ts(x - slope (s - s0), y - slope (t - t0))``, interpolated linearly,
+    by cubic convolution or exactly, and weighted by the aperture and by the confidence of each sample; a sample
+    outside its view has no weight. A pixel that no weight reaches shows the centre view.
 
     Parameters
     ----------
     light_field
         Views ``(T, S, V, U, 3)``.
     slopes
-        ``(K,)`` px of shift between neighbouring views, positive = nearer than the plane of zero slope.
+        ``(K,)`` px of shift between neighbouring views, positive = nearer than the plane of zero slope; with a tilt,
+        that of the picture's middle.
     options
-        Which views take part.
+        Which views take part, how they are shifted, and what is shown of their values.
     progress
-        Told the image rows done.
+        Told the work done.
 
     Returns
     -------
@@ -125,7 +125,7 @@ def refocus(
     InputError
         If a slope is not finite or moves a view by more than its own size.
     ConfigError
-        If the radius of the aperture is not positive.
+        If the aperture has no area, or two options do not go together.
 
     References
     ----------
@@ -143,18 +143,41 @@ def refocus(
     >>> refocus(field, [1.0], RefocusOptions(aperture="all"))[0, 0, :, 0].tolist()
     [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]
     """
-    slopes_px = _checked_slopes(light_field, slopes)
-    aperture = aperture_weights(light_field, options)
-    rows, columns = light_field.views.shape[2:4]
-    slices = np.empty((len(slopes_px), rows, columns, 3), np.float32)
+    slopes_px = _checked_slopes(light_field, slopes, options)
+    field = _without_dim_samples(light_field, options.least_weight)
+    aperture = aperture_weights(field, options)
+    if options.reduction != "mean" or any(options.tilt):
+        from lfstereo.focus.view_statistics import reduce_views
+
+        return reduce_views(field, slopes_px, aperture, options, progress)
+    if options.interpolation == "fourier":
+        from lfstereo.focus.spectral_shift import refocus_by_spectrum
+
+        return refocus_by_spectrum(field, slopes_px, aperture, progress)
+    return _averaged(field, slopes_px, aperture, options.interpolation == "cubic", progress)
+
+
+def _averaged(field: LightField, slopes_px: Float64, aperture: Float32, cubic: bool, progress: Progress) -> Float32:
+    from lfstereo.focus.shift_kernels import average_views
+
+    count_t, count_s, rows, columns = field.views.shape[:4]
+    views = np.ascontiguousarray(field.views).reshape(count_t, count_s, rows, columns * 3)
+    if field.weight is None:
+        weight, coverage = np.empty((0, 0, 0, 0), np.uint8), _coverage(field, slopes_px, aperture, cubic)
+    else:
+        weight, coverage = np.ascontiguousarray(field.weight), np.empty((1, 1, 0), np.float32)
+    slices = np.empty((len(slopes_px), rows, columns * 3), np.float32)
     for first in range(0, rows, _ROWS_PER_REPORT):
         last = min(first + _ROWS_PER_REPORT, rows)
-        slices[:, first:last] = _refocused_rows(light_field, slopes_px, aperture, first, last)
+        part = slices[:, first:last]
+        average_views(views, weight, coverage, aperture, slopes_px, field.centre, cubic, first, part)
         progress(last, rows)
-    return slices
+    return slices.reshape(len(slopes_px), rows, columns, 3)
 
 
-def _checked_slopes(light_field: LightField, slopes: Sequence[float] | Float64 | Float32) -> Float64:
+def _checked_slopes(
+    light_field: LightField, slopes: Sequence[float] | Float64 | Float32, options: RefocusOptions
+) -> Float64:
     where = light_field.source or "light field"
     slopes_px = np.asarray(slopes, np.float64)
     if slopes_px.ndim != 1 or slopes_px.size == 0:
@@ -162,43 +185,40 @@ def _checked_slopes(light_field: LightField, slopes: Sequence[float] | Float64 |
     if light_field.views.dtype != np.float32:
         raise ShapeError(f"{where}: found views of type {light_field.views.dtype}, expected float32 linear RGB")
     largest = max(light_field.views.shape[2:4])
+    lean = 0.5 * (abs(options.tilt[0]) + abs(options.tilt[1]))
     for slope in slopes_px:
-        if not abs(slope) <= largest:
+        if not abs(slope) + lean <= largest:
             raise InputError(f"{where}: slope {slope} px per view, expected a shift within the view ({largest} px)")
     return slopes_px
 
 
-def _refocused_rows(field: LightField, slopes_px: Float64, aperture: Float32, first: int, last: int) -> Float32:
-    from lfstereo.focus.shift_kernels import sum_views, sum_weighted_views
-
-    count_t, count_s, rows, columns = field.views.shape[:4]
-    views = np.ascontiguousarray(field.views).reshape(count_t, count_s, rows, columns * 3)
-    summed = np.zeros((len(slopes_px), last - first, columns * 3), np.float32)
-    if field.weight is None:
-        sum_views(views, aperture, slopes_px, field.centre, first, summed)
-        weights = _coverage(field, slopes_px, aperture)[:, first:last]
-    else:
-        weights = np.zeros((len(slopes_px), last - first, columns), np.float32)
-        weight = np.ascontiguousarray(field.weight)
-        sum_weighted_views(views, weight, aperture, slopes_px, field.centre, first, summed, weights)
-    reached = weights > _LEAST_WEIGHT
-    summed = summed.reshape(len(slopes_px), last - first, columns, 3)
-    summed *= (1.0 / np.where(reached, weights, 1.0)).astype(np.float32)[..., None]
-    if not reached.all():
-        centre = np.broadcast_to(field.views[field.centre][first:last], summed.shape)
-        summed[~reached] = centre[~reached]
-    return summed
+def _without_dim_samples(light_field: LightField, least: float) -> LightField:
+    """Return the light field with no weight where it is below a share of the largest."""
+    if not 0 <= least <= 1:
+        raise ConfigError(f"least_weight = {least}: expected a share from 0 to 1")
+    if least == 0 or light_field.weight is None:
+        return light_field
+    weight = np.where(light_field.weight >= 255 * least, light_field.weight, 0).astype(np.uint8)
+    return replace(light_field, weight=weight)
 
 
-def _coverage(field: LightField, slopes_px: Float64, aperture: Float32) -> Float32:
+def _coverage(field: LightField, slopes_px: Float64, aperture: Float32, cubic: bool) -> Float32:
     """Summed weight ``(K, V, U)`` of the samples that lie inside their view, where all count alike."""
     t0, s0 = field.centre
     rows, columns = field.views.shape[2:4]
-
-    def inside(count: int, views_away: Float64) -> Float64:
-        at = np.arange(count) - slopes_px[:, None, None] * views_away[:, None]
-        return np.clip(np.minimum(at + 1.0, count - at), 0.0, 1.0)
-
-    along_u = inside(columns, np.arange(field.views.shape[1], dtype=np.float64) - s0)
-    along_v = inside(rows, np.arange(field.views.shape[0], dtype=np.float64) - t0)
+    along_u = _inside(columns, slopes_px[:, None] * (np.arange(field.views.shape[1]) - s0), cubic)
+    along_v = _inside(rows, slopes_px[:, None] * (np.arange(field.views.shape[0]) - t0), cubic)
     return (along_v.transpose(0, 2, 1) @ (aperture.astype(np.float64) @ along_u)).astype(np.float32)
+
+
+def _inside(count: int, shifts_px: Float64, cubic: bool) -> Float64:
+    """Return ``(*shifts, count)`` what is left of a row of ones after a shift."""
+    from lfstereo.focus.shift_kernels import TAPS, tap_gains
+
+    gains = np.empty(TAPS, np.float32)
+    left = np.zeros((*shifts_px.shape, count))
+    for place in np.ndindex(shifts_px.shape):
+        first = tap_gains(float(shifts_px[place]), cubic, gains)
+        for j, gain in enumerate(gains):
+            left[place][max(0, first + j) : max(0, count + min(0, first + j))] += gain
+    return left
