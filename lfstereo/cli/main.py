@@ -24,6 +24,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "view-grid": ("lfstereo.cli.view_grid", "picture of a lenslet grid over its frame, and of what it leaves"),
     "export": ("lfstereo.cli.export", "light field or raw capture to the format of another program"),
     "run": ("lfstereo.cli.run", "two captures to disparity, depth, all-in-focus image and point cloud"),
+    "batch": ("lfstereo.cli.batch", "every stereo pair under a folder to depth, on many cores or a cluster"),
     "synthesize": (
         "lfstereo.cli.synthesize",
         "a dual focal stack data set from stereo pictures of known disparity",

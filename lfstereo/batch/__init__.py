@@ -1,0 +1,1 @@
+"""Many captures: pairing, plan, record, workers, summary. Imports nothing, so that workers start fast."""

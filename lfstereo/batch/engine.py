@@ -1,0 +1,160 @@
+"""Hands jobs to executors, one step after the other, and takes every end of them in: done, failed or lost."""
+
+from __future__ import annotations
+
+import time
+from collections import Counter, deque
+from collections.abc import Callable, Sequence
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Future, wait
+from dataclasses import dataclass, replace
+from typing import Any
+
+from lfstereo.batch.attempts import DISK_FULL, verdict_on_loss
+from lfstereo.batch.crew import Crew, Step
+from lfstereo.batch.jobs import Job, Outcome
+from lfstereo.batch.notes import TIME_LIMIT, Note, mark_stopped, read_note
+
+_TICK_S = 1.0
+_GRACE_S = 20.0
+"""Beyond the time limit, for a worker to end itself."""
+
+
+@dataclass(frozen=True, slots=True)
+class Flight:
+    """A job in an executor."""
+
+    job: Any
+    at: int
+    """Number of the step."""
+    before: Outcome | None
+    """What the step before made."""
+
+
+class Engine:
+    """The run of some jobs through the steps of a crew.
+
+    Parameters
+    ----------
+    crew
+        Who works.
+    steps
+        What is done with each job.
+    ended
+        Told the outcome of each job.
+    tick
+        Told, about every second, what the workers do.
+    """
+
+    def __init__(
+        self,
+        crew: Crew,
+        steps: Sequence[Step],
+        ended: Callable[[Outcome], None],
+        tick: Callable[[Sequence[Note]], None],
+    ) -> None:
+        self._crew, self._steps, self._ended, self._tick = crew, steps, ended, tick
+        self._waiting: list[deque[Flight]] = [deque() for _ in steps]
+        self._flying: dict[Future[Outcome], Flight] = {}
+        self._lost: Counter[str] = Counter()
+        self._seen: dict[tuple[str, int, int], float] = {}
+        self._looked = 0.0
+        self._stopped = ""
+
+    def run(self, jobs: Sequence[Job]) -> str:
+        """Take all jobs to an end.
+
+        Returns
+        -------
+        Empty, or why jobs were left that nothing is known of: the disk is full, the scheduler is gone.
+        """
+        self._waiting[0].extend(Flight(job, 0, None) for job in jobs)
+        while self._flying or (any(self._waiting) and not self._stopped):
+            self._hand_out()
+            done, _ = wait(self._flying, _TICK_S, FIRST_COMPLETED)
+            for future in done:
+                self._take_in(self._flying.pop(future), future)
+            if time.monotonic() - self._looked >= _TICK_S:
+                self._looked = time.monotonic()
+                self._look_after()
+        return self._stopped
+
+    def _hand_out(self) -> None:
+        if self._stopped:
+            return
+        for at in reversed(range(len(self._steps))):
+            step, queue = self._steps[at], self._waiting[at]
+            room = step.capacity() - sum(flight.at == at for flight in self._flying.values()) if queue else 0
+            if at + 1 < len(self._steps):
+                room = min(room, 2 * self._steps[at + 1].capacity() - len(self._waiting[at + 1]))
+            for _ in range(min(room, len(queue))):
+                flight = queue.popleft()
+                self._flying[step.executor.submit(step.work, flight.job)] = flight
+
+    def _take_in(self, flight: Flight, future: Future[Outcome]) -> None:
+        job = flight.job
+        try:
+            outcome = future.result()
+        except CancelledError:
+            self._stopped = "the scheduler was lost"
+            return
+        except BrokenExecutor:
+            self._again(flight)
+            return
+        except Exception as error:
+            words = " ".join(str(error).split())
+            lost = read_note(job.note)
+            verdict = verdict_on_loss(replace(job, retries=0), lost) if lost and lost.token == job.token else None
+            outcome = verdict or Outcome(job.name, "failed", f"worker: {words}", type(error).__name__)
+        outcome = _together(flight.before, outcome)
+        if outcome.kind == DISK_FULL:
+            self._stopped = outcome.reason
+        if outcome.state == "focused":
+            self._waiting[flight.at + 1].append(Flight(job, flight.at + 1, outcome))
+        else:
+            self._ended(outcome)
+
+    def _again(self, flight: Flight) -> None:
+        """Try a job again whose worker died, unless it died of the job too often."""
+        job = flight.job
+        self._lost[job.name] += 1
+        note = read_note(job.note)
+        if note is None or note.token != job.token:
+            note = Note(job.token, self._lost[job.name], "", 0, "start", 0.0)
+        verdict = verdict_on_loss(job, replace(note, attempt=max(note.attempt, self._lost[job.name])))
+        if verdict is None:
+            self._waiting[flight.at].appendleft(flight)
+        else:
+            job.note.unlink(missing_ok=True)
+            self._ended(_together(flight.before, verdict))
+
+    def _look_after(self) -> None:
+        """Read the workers' notes; end a worker that is over its time and did not end itself."""
+        notes = []
+        for future, flight in list(self._flying.items()):
+            note = read_note(flight.job.note)
+            if note is None or note.token != flight.job.token:
+                continue
+            notes.append(note)
+            since = self._seen.setdefault((flight.job.name, flight.at, note.attempt), time.monotonic())
+            if time.monotonic() - since > flight.job.time_limit_s + _GRACE_S:
+                mark_stopped(flight.job.note, TIME_LIMIT)
+                if not self._crew.stop(note):
+                    del self._flying[future]
+                    future.cancel()
+                    verdict = verdict_on_loss(flight.job, replace(note, stopped=TIME_LIMIT))
+                    self._ended(_together(flight.before, verdict or Outcome(flight.job.name, "failed")))
+        self._tick(notes)
+
+
+def _together(first: Outcome | None, last: Outcome) -> Outcome:
+    """Return the outcome of a pair over both steps."""
+    if first is None:
+        return last
+    return replace(
+        last,
+        inputs=first.inputs | last.inputs,
+        seconds=first.seconds | last.seconds,
+        peak_gib=max(first.peak_gib, last.peak_gib),
+        attempt=max(first.attempt, last.attempt),
+        workers=(*first.workers, *last.workers),
+    )

@@ -1,0 +1,60 @@
+"""What the summary shows of a pair: figures of quality and a small picture."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from lfstereo.arrays import Float32
+from lfstereo.lightfield.encoding import srgb8
+from lfstereo.pipeline import PairResult
+from lfstereo.results import Report
+
+THUMBNAIL = "thumbnail.jpg"
+_THUMBNAIL_HEIGHT_PX = 120
+_JPEG_QUALITY = 85
+
+
+def quality_figures(report: Report, result: PairResult) -> dict[str, float]:
+    """Return the figures of a finished pair: coverage, ranges, agreement of the two views, errors where truth is known.
+
+    ``view_difference`` is the mean difference, in 8-bit sRGB levels, between the left centre view and the right one
+    moved by the disparity, over the valid pixels: small where the map fits the pictures, 20 and more where it does not.
+    """
+    figures = {
+        "valid_share": report.valid_share,
+        "disparity_low_px": report.disparity_px[0],
+        "disparity_high_px": report.disparity_px[1],
+        "depth_low_m": report.depth_m[0],
+        "depth_high_m": report.depth_m[1],
+        "points": float(report.points),
+        "view_difference": view_difference(result),
+    }
+    figures |= report.errors.get("lfstereo", {})
+    return {name: round(float(value), 5) for name, value in figures.items()}
+
+
+def view_difference(result: PairResult) -> float:
+    """Return the mean absolute difference of the left view and the right one moved onto it, sRGB levels 0..255."""
+    left = srgb8(result.left.centre_view).astype(np.float32)
+    right = srgb8(result.right.centre_view).astype(np.float32)
+    disparity = np.asarray(result.map.disparity, np.float32)
+    rows, columns = disparity.shape
+    x = np.arange(columns, dtype=np.float32)[None] - disparity
+    y = np.repeat(np.arange(rows, dtype=np.float32)[:, None], columns, axis=1)
+    moved: Float32 = np.asarray(cv2.remap(right, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE), np.float32)
+    valid = result.map.valid
+    return float(np.abs(left - moved)[valid].mean()) if valid.any() else 0.0
+
+
+def write_thumbnail(folder: Path) -> None:
+    """Put the all-in-focus image and the coloured disparity of a result folder side by side, small."""
+    parts = []
+    for name in ("all_in_focus.png", "disparity_colour.png"):
+        picture = cv2.imread(str(folder / name))
+        width = max(1, round(picture.shape[1] * _THUMBNAIL_HEIGHT_PX / picture.shape[0]))
+        parts.append(cv2.resize(picture, (width, _THUMBNAIL_HEIGHT_PX), interpolation=cv2.INTER_AREA))
+    encoded = cv2.imencode(".jpg", np.hstack(parts), [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY])[1]
+    (folder / THUMBNAIL).write_bytes(encoded.tobytes())

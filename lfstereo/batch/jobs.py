@@ -1,0 +1,88 @@
+"""What is handed to a worker and what comes back: plain values that any executor can carry."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal, TypeAlias
+
+from lfstereo.batch.stamps import FileStamp
+from lfstereo.pipeline import RunOptions
+
+WORK_FOLDER = ".batch"
+"""Hidden folder in the output: notes of running workers, lenslet grids, focal stacks on their way."""
+State = Literal["done", "focused", "failed"]
+
+
+@dataclass(frozen=True, slots=True)
+class Job:
+    """One piece of work, to be done once or recorded as failed."""
+
+    name: str
+    output: Path
+    """Output folder of the batch, absolute, seen alike by all workers."""
+    token: str
+    """Of the batch that handed it out; work of an earlier batch that is still running is thrown away."""
+    retries: int
+    """New attempts after a lost worker."""
+    time_limit_s: float
+
+    @property
+    def note(self) -> Path:
+        """File in which its worker tells what it does."""
+        return self.output / WORK_FOLDER / "notes" / f"{self.name}.json"
+
+
+@dataclass(frozen=True, slots=True)
+class CameraJob(Job):
+    """Fit the lenslet grid of one camera before its captures come."""
+
+    capture: Path
+    whites: Path
+
+
+@dataclass(frozen=True, slots=True)
+class PairJob(Job):
+    """Convert one pair."""
+
+    left: Path
+    right: Path
+    rig: Path
+    whites: Path | None
+    options: RunOptions
+    truth: Path | None = None
+
+    @property
+    def folder(self) -> Path:
+        """The pair's result folder."""
+        return self.output / self.name
+
+    @property
+    def focused(self) -> Path:
+        """File that carries its focal stacks from one worker to another."""
+        return self.output / WORK_FOLDER / "focused" / f"{self.name}.npz"
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What became of a job."""
+
+    name: str
+    state: State
+    reason: str = ""
+    """Of a failure, on one line."""
+    kind: str = ""
+    """Class of the error."""
+    inputs: dict[str, FileStamp] = field(default_factory=dict)
+    """Files that the result was made from, by role."""
+    weights_sha256: str = ""
+    figures: dict[str, float] = field(default_factory=dict)
+    seconds: dict[str, float] = field(default_factory=dict)
+    peak_gib: float = 0.0
+    attempt: int = 1
+    workers: tuple[str, ...] = ()
+    """``host:process`` of each step."""
+
+
+Work: TypeAlias = Callable[[PairJob], Outcome]

@@ -1,0 +1,66 @@
+"""A worker process: started light, ended when its parent is gone or its time is up."""
+
+from __future__ import annotations
+
+import faulthandler
+import multiprocessing
+import os
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+_GRACE_S = 5.0
+"""Time for the watching thread to act before the hard stop, which also ends code that holds the interpreter."""
+_THREAD_SETTINGS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
+
+
+def start_worker(threads: int) -> None:
+    """Prepare a local worker process, before it imports anything large.
+
+    Parameters
+    ----------
+    threads
+        Threads that numerical libraries may use.
+    """
+    for name in _THREAD_SETTINGS:
+        os.environ[name] = str(threads)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+
+        def follow() -> None:
+            parent.join()
+            os._exit(1)
+
+        threading.Thread(target=follow, daemon=True).start()
+
+
+@contextmanager
+def time_limit(limit_s: float, last_words: Callable[[], None]) -> Iterator[None]:
+    """End this process if the block takes longer.
+
+    Parameters
+    ----------
+    limit_s
+        Wall time.
+    last_words
+        Called before the end, where the interpreter still runs.
+    """
+
+    def stop() -> None:
+        with suppress(OSError):
+            last_words()
+        os._exit(1)
+
+    timer = threading.Timer(limit_s, stop)
+    timer.daemon = True
+    with Path(os.devnull).open("w") as nowhere:
+        timer.start()
+        faulthandler.dump_traceback_later(limit_s + _GRACE_S, exit=True, file=nowhere)
+        try:
+            yield
+        finally:
+            timer.cancel()
+            faulthandler.cancel_dump_traceback_later()
