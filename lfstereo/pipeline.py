@@ -19,6 +19,7 @@ from lfstereo.focus.stack import FocalStack
 from lfstereo.lenslet.white import find_white_image
 from lfstereo.lightfield.decoding import decode
 from lfstereo.lightfield.field import LightField
+from lfstereo.lightfield.samples import ViewSamples, sample_views
 from lfstereo.lightfield.store import read_light_field
 from lfstereo.options import option
 from lfstereo.progress import Progress, StageClock, silent
@@ -54,6 +55,10 @@ class SideResult:
     seen: Bool
     """``(V, U)``: inside this camera's own field of view."""
     serial: str
+    slope_from_disparity: tuple[float, float]
+    """``(a, b)`` of ``slope = a d + b``, px per view."""
+    samples: ViewSamples | None
+    """Some of the rectified views, of the left camera alone."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -195,15 +200,24 @@ def focus_side(
     views_across = max(light_field.views.shape[:2])
     with clock.stage(f"rectify {side}") as progress:
         rectified = rectify(light_field, rig, geometry, side, progress, options.any_zoom, options.any_camera)
+    slope_from_disparity = geometry.slope_from_disparity(step_m)
     with clock.stage(f"focal stack {side}") as progress:
         stack = render_stack(
             rectified,
             slice_disparities(geometry.disparity_max_px, 0.0, options.slices),
-            geometry.slope_from_disparity(step_m),
+            slope_from_disparity,
             aperture_ratio=views_across * step_m / rig.baseline_m,
             progress=progress,
         )
-    return SideResult(stack=stack, centre_view=rectified.views[t0, s0].copy(), seen=seen, serial=light_field.serial)
+        samples = sample_views(rectified) if side == "left" else None
+    return SideResult(
+        stack=stack,
+        centre_view=rectified.views[t0, s0].copy(),
+        seen=seen,
+        serial=light_field.serial,
+        slope_from_disparity=slope_from_disparity,
+        samples=samples,
+    )
 
 
 def common_field(disparity: Float32, seen_left: Bool, seen_right: Bool) -> Bool:

@@ -16,6 +16,8 @@ from lfstereo import __version__
 from lfstereo.arrays import Bool, Disparity, Float32, UInt8
 from lfstereo.depth.baselines import fill_from_background, sgbm, sgbm_wls
 from lfstereo.depth.colormap import DisparityScale, colour_disparity, picture_disparity
+from lfstereo.depth.glb import write_glb
+from lfstereo.depth.mesh import mesh_from_depth
 from lfstereo.depth.metrics import score_disparity
 from lfstereo.depth.pfm import read_pfm, write_pfm
 from lfstereo.depth.pictures import write_png
@@ -30,6 +32,8 @@ from lfstereo.options import to_toml, toml_value
 from lfstereo.outputs import atomic_folder
 from lfstereo.pipeline import PairResult, RunOptions
 from lfstereo.progress import StageClock
+from lfstereo.viewer.content import PAGE_NAME, encode_result, result_content
+from lfstereo.viewer.template import fill_page
 
 _GAP_PX = 8
 _PACKAGES = ("numpy", "scipy", "opencv-contrib-python-headless", "torch")
@@ -122,8 +126,12 @@ def fill_folder(
         for side, part in (("left", result.left), ("right", result.right)):
             write_png(out / f"centre_{side}.png", srgb8(part.centre_view))
             _write_stack(out / f"focal_stack_{side}", part.stack)
+    with clock.stage("encode page"):
+        encoded = encode_result(result)
     report = _summary(result, depth, points, clock, errors)
-    (out / "run.toml").write_text(_run_toml(report, result, inputs, options), "utf-8")
+    run_toml = _run_toml(report, result, inputs, options)
+    (out / "run.toml").write_text(run_toml, "utf-8")
+    (out / PAGE_NAME).write_text(fill_page(result_content(encoded, run_toml, out)), "utf-8")
     return report
 
 
@@ -202,6 +210,9 @@ def _write_maps(out: Path, result: PairResult, depth: DepthMap) -> int:
     write_png(out / "all_in_focus.png", sharp)
     cloud = points_from_depth(depth, found.all_in_focus, geometry.focal_px, geometry.left.principal_px)
     write_ply(out / "point_cloud.ply", cloud)
+    mesh = mesh_from_depth(depth, geometry.focal_px, geometry.left.principal_px)
+    if len(mesh.triangles):
+        write_glb(out / "mesh.glb", mesh, sharp)
     coloured = colour_disparity(found.disparity, depth.valid, scale)
     write_png(out / "overview.png", _overview(result, sharp, coloured))
     return len(cloud.points_m)

@@ -1,0 +1,1 @@
+"""Results and light fields as one HTML page, and a server for refocusing live."""

@@ -1,0 +1,175 @@
+"""What a page shows, as plain values: pictures, disparity, geometry, figures and files.
+
+Keys of a page's content
+    ``title`` parts of the heading; ``lede`` the line below; ``made`` by what; ``size`` (V, U) of all pictures;
+    ``turbo`` colours of disparity; ``pictures`` by name; ``slices`` near to far with the disparity in focus; ``views``
+    with their place (s, t) in the pupil; ``disparity`` codes and valid bits; ``doubt`` codes, 255 = no answer;
+    ``geometry`` that turns px into metres; ``axis`` of the focus scale; ``slope_from_disparity`` px per view;
+    ``record`` the tables of ``run.toml``; ``files`` beside the page; ``live`` what a server offers, or ``None``.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lfstereo.arrays import Float32, UInt8
+from lfstereo.depth.baselines import sgbm
+from lfstereo.focus.stack import FocalStack
+from lfstereo.lightfield.encoding import srgb8
+from lfstereo.lightfield.samples import ViewSamples
+from lfstereo.pipeline import PairResult
+from lfstereo.viewer.embedding import array_text, colour_table, jpeg_uri, mask_text
+
+PAGE_NAME = "report.html"
+_SHARP_QUALITY = 95
+_DISPARITY_CODES_PER_PX = 256
+_DOUBT_CODES_PER_PX = 16
+_NO_ANSWER = 255
+_DOUBT_LABEL = (
+    "How far a second method is away: OpenCV's semi-global matching of the two centre views. Small where both agree, "
+    "which is no proof. Darkest where the second method has no answer. A comparison, not a measured uncertainty."
+)
+_ABOUT = {
+    "overview.png": "near and far slice, all-in-focus image, disparity",
+    "disparity.pfm": "disparity in px, float32, inf = unknown",
+    "disparity.png": "disparity, 16 bit, 256 per px, 0 = unknown",
+    "disparity_colour.png": "disparity as colours, scale in px and metres",
+    "depth.tiff": "depth z in metres, float32",
+    "valid.png": "where both cameras see",
+    "all_in_focus.png": "left view, everything sharp, sRGB",
+    "centre_left.png": "left centre view, rectified, sRGB",
+    "centre_right.png": "right centre view, rectified, sRGB",
+    "focal_stack_left": "slices near to far, 16-bit sRGB",
+    "focal_stack_right": "slices near to far, 16-bit sRGB",
+    "point_cloud.ply": "coloured points in metres",
+    "mesh.glb": "textured surface in metres, binary glTF",
+    "run.toml": "options, versions, checksums, geometry, times",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class EncodedResult:
+    """The parts of a result's page that take time to make, before its figures are known."""
+
+    parts: dict[str, Any]
+
+
+def encode_result(result: PairResult) -> EncodedResult:
+    """Encode pictures, disparity and the second opinion of a run."""
+    found, geometry, left = result.map, result.geometry, result.left
+    codes = np.rint(np.clip(found.disparity * _DISPARITY_CODES_PER_PX, 0, 65535)).astype(np.uint16)
+    samples = left.samples
+    parts = {
+        "size": list(found.disparity.shape),
+        "turbo": colour_table(),
+        "pictures": {
+            "sharp": jpeg_uri(srgb8(found.all_in_focus), _SHARP_QUALITY),
+            "centre_left": jpeg_uri(srgb8(left.centre_view)),
+            "centre_right": jpeg_uri(srgb8(result.right.centre_view)),
+        },
+        "slices": _slices(left.stack),
+        **encode_views(samples),
+        "disparity": {
+            "values": array_text(codes),
+            "px_per_code": 1 / _DISPARITY_CODES_PER_PX,
+            "valid": mask_text(found.valid),
+        },
+        "doubt": {
+            "values": array_text(_second_opinion(result)),
+            "px_per_code": 1 / _DOUBT_CODES_PER_PX,
+            "label": _DOUBT_LABEL,
+        },
+        "geometry": {
+            "focal_px": geometry.focal_px,
+            "baseline_m": geometry.baseline_m,
+            "doffs_px": geometry.doffs_px,
+            "principal_px": list(geometry.left.principal_px),
+        },
+        "axis": {
+            "near": float(left.stack.disparities_px[0]),
+            "far": float(left.stack.disparities_px[-1]),
+            "unit": "px",
+            "metric": True,
+        },
+        "slope_from_disparity": list(left.slope_from_disparity),
+    }
+    return EncodedResult(parts)
+
+
+def encode_views(samples: ViewSamples | None) -> dict[str, Any]:
+    """Return the keys of a page that hold its views; none where there are no samples."""
+    if samples is None:
+        return {"views": [], "view_step": 1, "views_in_all": 0}
+    views = [
+        {"s": s, "t": t, "picture": jpeg_uri(picture)}
+        for (s, t), picture in zip(samples.places, samples.pictures, strict=True)
+    ]
+    return {"views": views, "view_step": samples.step, "views_in_all": samples.views_in_all}
+
+
+def result_content(encoded: EncodedResult, run_toml: str, folder: Path) -> dict[str, Any]:
+    """Return the content of a result's page.
+
+    Parameters
+    ----------
+    encoded
+        From :func:`encode_result`.
+    run_toml
+        The text of the folder's ``run.toml``.
+    folder
+        The folder that holds the page; the files in it are listed.
+    """
+    record = tomllib.loads(run_toml)
+    summary = record["summary"]
+    near, far = summary["depth_m"]
+    lede = (
+        f"{summary['width']} × {summary['height']} px, {near:.2f} to {far:.2f} m from the camera, "
+        f"{100 * summary['valid_share']:.0f} % of the picture seen by both cameras."
+    )
+    return encoded.parts | {
+        "title": [record["inputs"]["left"], record["inputs"]["right"]],
+        "lede": lede,
+        "made": f"lfstereo {record['versions']['lfstereo']} · {record['run']['model']}",
+        "record": record,
+        "files": list_files(folder),
+        "live": None,
+    }
+
+
+def list_files(folder: Path) -> list[dict[str, Any]]:
+    """Return name, address beside the page, meaning and size of the files in a result folder."""
+    order = list(_ABOUT)
+    found = sorted(
+        (path for path in folder.iterdir() if path.name != PAGE_NAME and not path.name.startswith(".")),
+        key=lambda path: (order.index(path.name) if path.name in order else len(order), path.name),
+    )
+    return [
+        {
+            "name": path.name + ("/" if path.is_dir() else ""),
+            "href": path.name + ("/" if path.is_dir() else ""),
+            "about": _ABOUT.get(path.name, ""),
+            "bytes": sum(p.stat().st_size for p in path.rglob("*")) if path.is_dir() else path.stat().st_size,
+        }
+        for path in found
+    ]
+
+
+def _slices(stack: FocalStack) -> list[dict[str, Any]]:
+    return [
+        {"disparity": float(disparity), "picture": jpeg_uri(srgb8(picture))}
+        for disparity, picture in zip(stack.disparities_px, stack.slices, strict=True)
+    ]
+
+
+def _second_opinion(result: PairResult) -> UInt8:
+    """Return the codes ``(V, U)`` of the distance between the map and semi-global matching, 255 = no answer."""
+    views = result.left.centre_view, result.right.centre_view
+    other = sgbm(*views, result.geometry.disparity_max_px)
+    away: Float32 = np.abs(result.map.disparity - other.disparity) * np.float32(_DOUBT_CODES_PER_PX)
+    codes: UInt8 = np.where(other.valid, np.clip(np.rint(away), 0, _NO_ANSWER - 1), _NO_ANSWER).astype(np.uint8)
+    return codes
