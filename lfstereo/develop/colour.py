@@ -5,9 +5,9 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from lfstereo.arrays import Float32, Rgb
+from lfstereo.arrays import Float32, Float64, Rgb
 from lfstereo.container.metadata import FrameMetadata, Quad
-from lfstereo.errors import MetadataError
+from lfstereo.errors import ConfigError, MetadataError
 from lfstereo.lenslet.flatten import site_levels
 
 
@@ -52,29 +52,47 @@ def grey_world_gains(mosaic: Float32, bayer: str) -> Quad:
     return means["g"] / means["r"], 1.0, 1.0, means["g"] / means["b"]
 
 
-def to_linear_srgb(rgb: Rgb, metadata: FrameMetadata, apply_exposure_bias: bool) -> Rgb:
-    """Turn white-balanced camera colours into linear sRGB, in place; greys stay grey.
+def camera_matrix(metadata: FrameMetadata, temperature_k: float | None = None) -> Float64:
+    """Return ``(3, 3)``: white-balanced camera RGB to linear sRGB, greys unchanged.
 
     Parameters
     ----------
-    rgb
-        ``(H, W, 3)`` white-balanced camera RGB.
     metadata
-        Colour matrix and exposure bias of the photograph. The matrix's rows are scaled to sum 1, which keeps
-        greys.
-    apply_exposure_bias
-        Brighten or darken by the camera's ``modulationExposureBias``.
+        Colour matrices of the photograph. Rows are scaled to sum 1, which keeps greys.
+    temperature_k
+        Colour temperature of the light, kelvin: interpolates between the factory's matrices, linearly in kelvin as
+        the cameras do, and takes the first or last one beyond them. ``None`` takes the photograph's own matrix, which
+        the camera interpolated in this way for the temperature it found.
 
     Raises
     ------
+    ConfigError
+        If the temperature is not one that light has.
     MetadataError
-        If a row of the colour matrix does not have a positive sum.
+        If a row of the matrix does not have a positive sum, or a temperature is given and the metadata hold no
+        matrices to interpolate between.
+
     """
-    matrix = np.asarray(metadata.ccm, np.float64).reshape(3, 3)
+    matrix = np.asarray(metadata.ccm, np.float64)
+    if temperature_k is not None:
+        if not 1000 <= temperature_k <= 40000:
+            raise ConfigError(f"temperature_k: found {temperature_k:g}, expected 1000 to 40000 K; daylight has 5500")
+        if not metadata.ccm_by_cct:
+            raise MetadataError(
+                f"perCcm: found no colour matrices to interpolate at {temperature_k:g} K, expected some in the "
+                "metadata; leave the temperature out to take the photograph's own matrix"
+            )
+        known = np.array([cct for cct, _ in metadata.ccm_by_cct])
+        stack = np.array([numbers for _, numbers in metadata.ccm_by_cct], np.float64)
+        matrix = np.array([np.interp(temperature_k, known, column) for column in stack.T])
+    matrix = matrix.reshape(3, 3)
     sums = matrix.sum(1)
     if not (sums > 0.1).all():
         raise MetadataError(f"ccm: found rows with sums {sums.round(3).tolist()}, expected about 1; check the metadata")
-    matrix = matrix / sums[:, None]
-    if apply_exposure_bias:
-        matrix = matrix * 2.0**metadata.exposure_bias_ev
-    return np.asarray(cv2.transform(rgb, matrix, dst=rgb), np.float32)
+    scaled: Float64 = matrix / sums[:, None]
+    return scaled
+
+
+def to_linear(rgb: Rgb, matrix: Float64, exposure_ev: float = 0.0) -> Rgb:
+    """Turn white-balanced camera colours into linear RGB by a matrix, in place, ``2^exposure_ev`` brighter."""
+    return np.asarray(cv2.transform(rgb, matrix * 2.0**exposure_ev, dst=rgb), np.float32)

@@ -4,19 +4,26 @@ from __future__ import annotations
 
 import numpy as np
 
-from lfstereo.arrays import Float32, Rgb
+from lfstereo.arrays import Float32, Rgb, UInt16
 from lfstereo.container.capture import Capture
 from lfstereo.container.metadata import FrameMetadata
-from lfstereo.develop.colour import grey_world_gains, to_linear_srgb, white_balance
+from lfstereo.develop.colour import camera_matrix, grey_world_gains, to_linear, white_balance
+from lfstereo.develop.colour_spaces import conversion
 from lfstereo.develop.demosaic import DEMOSAIC
 from lfstereo.develop.highlights import lift_clipped
 from lfstereo.develop.hotpixels import repair_hot_pixels
 from lfstereo.develop.options import DevelopOptions
 from lfstereo.develop.shading import devignette
+from lfstereo.errors import ConfigError
 from lfstereo.lenslet.flatten import site_levels
 
 
-def develop(capture: Capture, shading: Float32, options: DevelopOptions = DevelopOptions()) -> Rgb:
+def develop(
+    capture: Capture,
+    shading: Float32,
+    options: DevelopOptions = DevelopOptions(),
+    hot_pixels: UInt16 | None = None,
+) -> Rgb:
     """Develop a raw mosaic: levels, devignetting, hot pixels, white balance, highlights, demosaic, colour.
 
     Parameters
@@ -27,28 +34,41 @@ def develop(capture: Capture, shading: Float32, options: DevelopOptions = Develo
         ``(H, W)`` float32 relative illumination of its pixels, 1 = full light.
     options
         Methods and limits.
+    hot_pixels
+        ``(N, 2)`` (x, y) pixels that are known to be bad, as the camera's ``HOTPIXEL.BIN`` lists them.
 
     Returns
     -------
-    ``(H, W, 3)`` float32 linear RGB; 1 = the level at which green clips in full light; neither clipped above nor
-    below, so the result is linear in the light wherever the sensor was.
+    ``(H, W, 3)`` float32 linear RGB of the primaries that the options name; 1 = the level at which green clips in full
+    light; neither clipped above nor below, so the result is linear in the light wherever the sensor was.
 
     Raises
     ------
     AssetError
         If the shading has another size.
+    ConfigError
+        If the colour temperature cannot be, or a colour space is asked for without the colour matrix.
     MetadataError
-        If the colour matrix cannot be used.
+        If the colour matrix cannot be used, or there are none for a colour temperature.
     """
+    if not options.colour_matrix and options.colour_space != "srgb":
+        raise ConfigError(
+            f"colour_space: found {options.colour_space} without the colour matrix, expected one with the other; leave "
+            "the camera's own colours as they are, or apply the matrix"
+        )
     meta = capture.metadata
     mosaic = devignette(normalise_levels(capture), shading, options.shading_floor)
     if options.hot_pixels:
-        repair_hot_pixels(mosaic, options.hot_pixel_excess, noise=0.05)
+        repair_hot_pixels(mosaic, shading, options.hot_pixel_excess, noise=0.05, known=hot_pixels)
     grey_world = options.white_balance == "grey-world"
-    white_balance(mosaic, grey_world_gains(mosaic, meta.bayer) if grey_world else meta.white_balance, meta.bayer)
-    lift_clipped(mosaic, capture.mosaic, meta)
+    gains = grey_world_gains(mosaic, meta.bayer) if grey_world else meta.white_balance
+    white_balance(mosaic, gains, meta.bayer)
+    lift_clipped(mosaic, capture.mosaic, meta, gains)
     rgb = DEMOSAIC[options.demosaic](mosaic, meta.bayer)
-    return to_linear_srgb(rgb, meta, options.exposure_bias) if options.colour_matrix else rgb
+    if not options.colour_matrix:
+        return rgb
+    matrix = conversion("srgb", options.colour_space) @ camera_matrix(meta, options.temperature_k)
+    return to_linear(rgb, matrix, meta.exposure_bias_ev if options.exposure_bias else 0.0)
 
 
 def normalise_levels(capture: Capture) -> Float32:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from lfstereo.develop.colour_spaces import Primaries
 from lfstereo.options import option
 
 DemosaicMethod = Literal["malvar2004", "bilinear"]
@@ -20,4 +21,8 @@ class DevelopOptions:
     hot_pixels: bool = option(True, "repair pixels that their neighbours of the same colour contradict")
     hot_pixel_excess: float = option(0.5, "relative distance from the neighbours' range that makes a pixel hot")
     exposure_bias: bool = option(True, "apply the camera's exposure bias")
-    colour_matrix: bool = option(True, "turn camera colours into linear sRGB")
+    colour_matrix: bool = option(True, "turn camera colours into linear RGB of the colour space")
+    temperature_k: float | None = option(
+        None, "light's colour temperature, to interpolate the factory's colour matrices; none = as the camera did", "K"
+    )
+    colour_space: Primaries = option("srgb", "primaries of the light field; wide ones keep colours outside sRGB")

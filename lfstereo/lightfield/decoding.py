@@ -124,6 +124,7 @@ def views_from(
         source=capture.source,
         zoom_step=capture.metadata.lens.zoom_step,
         focus_step=capture.metadata.lens.focus_step,
+        colour_space=options.develop.colour_space,
     )
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from lfstereo.arrays import UInt8, Views, check_shape
+from lfstereo.develop.colour_spaces import Primaries
 from lfstereo.errors import ShapeError
 
 
@@ -40,6 +41,8 @@ class LightField:
     """State of the zoom lens as the camera wrote it; ``None`` where unknown."""
     focus_step: int | None = None
     """Likewise of its focus."""
+    colour_space: Primaries = "srgb"
+    """Primaries of the linear RGB."""
 
     def __post_init__(self) -> None:
         check_shape(f"{self.source}: views", self.views, (None, None, None, None, 3))

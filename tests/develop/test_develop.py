@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 
 from lfstereo.container import Capture
-from lfstereo.develop.colour import grey_world_gains, to_linear_srgb, white_balance
+from lfstereo.develop.colour import grey_world_gains, white_balance
 from lfstereo.develop.demosaic import DEMOSAIC, malvar2004
 from lfstereo.develop.develop import develop, normalise_levels
 from lfstereo.develop.highlights import lift_clipped
 from lfstereo.develop.hotpixels import repair_hot_pixels
 from lfstereo.develop.options import DevelopOptions
 from lfstereo.develop.shading import devignette, shading_from_photograph, shading_from_white_image
-from lfstereo.errors import AssetError, MetadataError
+from lfstereo.errors import AssetError
 from lfstereo.lenslet.fit import estimate_grid_from_photograph
 from lfstereo.lenslet.flatten import mean_brightness, site_levels
 
@@ -100,12 +100,6 @@ def test_exposure_bias_is_applied_and_can_be_left_out(capture: Capture) -> None:
     assert without[20, 20].tolist() == pytest.approx([0.2] * 3, abs=0.001)
 
 
-def test_colour_matrix_rows_must_sum_to_something(capture: Capture) -> None:
-    meta = replace(capture.metadata, ccm=(1.0, -1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0))
-    with pytest.raises(MetadataError, match=r"ccm: found rows with sums \[0\.0, 1\.0, 1\.0\], expected about 1"):
-        to_linear_srgb(np.ones((2, 2, 3), np.float32), meta, True)
-
-
 def test_white_balance_and_grey_world_undo_a_cast() -> None:
     rng = np.random.default_rng(0)
     grey = rng.uniform(0.1, 0.6, SHAPE)[..., None] * np.array([0.5, 1.0, 0.7])
@@ -158,15 +152,48 @@ def test_illumination_from_the_photograph_itself(draw_frame: Callable[..., Any])
     assert np.abs(found - true)[inner].mean() < 0.03
 
 
-def test_hot_and_dead_pixels_are_replaced_and_edges_are_not() -> None:
+def noisy_edge() -> np.ndarray:
     rng = np.random.default_rng(1)
     edge = np.where(np.arange(80) < 40, 0.2, 0.7)[None].repeat(60, 0).astype(np.float32)
-    frame = (edge * rng.uniform(0.97, 1.03, SHAPE)).astype(np.float32)
+    return (edge * rng.uniform(0.97, 1.03, SHAPE)).astype(np.float32)
+
+
+def test_hot_and_dead_pixels_are_replaced_and_edges_are_not() -> None:
+    frame, lit = noisy_edge(), np.ones(SHAPE, np.float32)
     clean = frame.copy()
-    assert repair_hot_pixels(frame, excess=0.5, noise=0.05) == 0
+    assert repair_hot_pixels(frame, lit, excess=0.5, noise=0.05) == 0
     frame[20, 20], frame[31, 61] = 0.9, 0.05
-    assert repair_hot_pixels(frame, excess=0.5, noise=0.05) == 2
+    assert repair_hot_pixels(frame, lit, excess=0.5, noise=0.05) == 2
     assert np.abs(frame - clean).max() < 0.05
+
+
+def test_known_pixels_are_replaced_from_good_neighbours_only() -> None:
+    frame, lit = noisy_edge(), np.ones(SHAPE, np.float32)
+    clean = frame.copy()
+    known = np.array([[20, 20], [22, 20], [61, 31], [79, 59], [80, 3], [5, 60]], np.uint16)  # the last two lie outside
+    frame[known[:4, 1], known[:4, 0]] *= 1.2  # too little to be found without the list
+    assert repair_hot_pixels(frame.copy(), lit, excess=0.5, noise=0.05) == 0
+    assert repair_hot_pixels(frame, lit, excess=0.5, noise=0.05, known=known) == 4
+    assert np.abs(frame - clean).max() < 0.045  # twice the noise of the brighter side
+
+
+def test_noise_in_the_dark_and_details_of_the_scene_are_no_hot_pixels() -> None:
+    rng = np.random.default_rng(4)
+    dark = np.full(SHAPE, 0.02, np.float32)
+    noise = np.maximum(0.5 + rng.normal(0, 0.01, SHAPE) / dark, 0).astype(np.float32)  # noise 0.01 before the division
+    assert repair_hot_pixels(noise, dark, excess=0.5, noise=0.05) == 0
+    assert repair_hot_pixels(noise, np.ones(SHAPE, np.float32), excess=0.5, noise=0.05) > 20
+    y, x = np.mgrid[: SHAPE[0], : SHAPE[1]]
+    star = (0.1 + 0.8 * np.exp(-((x - 40) ** 2 + (y - 30) ** 2) / 1.3)).astype(np.float32)
+    assert repair_hot_pixels(star, np.ones(SHAPE, np.float32), excess=0.5, noise=0.05) == 0
+
+
+def test_list_of_hot_pixels_reaches_the_development(capture: Capture) -> None:
+    values = np.full(SHAPE, 0.4)
+    values[20, 31] = 0.5
+    photo, lit = with_values(capture, values, white_balance=(1.0,) * 4), np.ones(SHAPE, np.float32)
+    assert develop(photo, lit).max() > 0.45
+    assert develop(photo, lit, hot_pixels=np.array([[31, 20]], np.uint16)).max() < 0.41
 
 
 def test_clipped_highlights_become_neutral(capture: Capture) -> None:
@@ -180,12 +207,35 @@ def test_clipped_highlights_become_neutral(capture: Capture) -> None:
         assert found.mean() > 1.0
 
 
+@pytest.mark.parametrize("bayer", BAYERS)
+def test_saturated_grey_ramp_stays_neutral(capture: Capture, bayer: str) -> None:
+    """From black to six times the level that clips, evenly lit and behind the rim of a micro-image."""
+    gains = (1.379, 1.0, 1.0, 1.148)
+    ramp = np.repeat((np.linspace(0.0, 6.0, 600)[None, :, None]), 3, axis=2).repeat(40, 0)
+    for light in (1.0, 0.4):
+        numbers = np.minimum(light * ramp / (gains[0], 1.0, gains[3]), 1.0)
+        photo = with_values(capture, mosaic_of(numbers, bayer), bayer=bayer, ccm=ILLUM_CCM, white_balance=gains)
+        found = develop(photo, np.full((40, 600), light, np.float32))[8:-8, 8:-8]
+        assert np.ptp(found, axis=2).max() < 0.05 * found.max()
+        brightness = found.mean((0, 2))
+        assert (np.diff(brightness) > -0.02).all()  # brighter light never comes out darker
+        assert brightness[-1] == pytest.approx(gains[0] / light, rel=0.02)  # the last colour to clip sets the level
+
+
+def test_coloured_lamp_keeps_its_colour(capture: Capture) -> None:
+    """Red and green clip, blue is far below: nothing says that the light is white."""
+    lamp = np.full((*SHAPE, 3), 1.0) * [1.3, 1.02, 0.1]
+    photo = with_values(capture, mosaic_of(np.minimum(lamp, 1.0), "grbg"), white_balance=(1.3, 1.0, 1.0, 1.0))
+    found = develop(photo, np.ones(SHAPE, np.float32))[10:-10, 10:-10].mean((0, 1))
+    assert found == pytest.approx([1.3, 1.0, 0.1], abs=0.01)
+
+
 def test_unclipped_values_are_not_lifted(capture: Capture) -> None:
     rng = np.random.default_rng(2)
     photo = with_values(capture, rng.uniform(0, 0.9, SHAPE))
     mosaic = normalise_levels(photo)
     before = mosaic.copy()
-    lift_clipped(mosaic, photo.mosaic, photo.metadata)
+    lift_clipped(mosaic, photo.mosaic, photo.metadata, (1.4, 1.0, 1.0, 1.2))
     assert np.array_equal(mosaic, before)
 
 
