@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import cv2
 import numpy as np
 
 from lfstereo.arrays import Bool, Float32, Float64
 from lfstereo.container.capture import Capture
 from lfstereo.errors import GridFitError, ShapeError
-from lfstereo.lenslet.centres import Centres, measure_centres
+from lfstereo.lenslet.centres import measure_centres
 from lfstereo.lenslet.flatten import flatten, mean_brightness
 from lfstereo.lenslet.grid import LensletGrid
 from lfstereo.lenslet.lattice import Lattice, to_grid
 from lfstereo.lenslet.options import GridOptions
 from lfstereo.lenslet.profile import mean_micro_image
+from lfstereo.lenslet.smooth_field import fit_smooth_field
 from lfstereo.lenslet.spectrum import coarse_frequencies, lattice_from_phases
+from lfstereo.lenslet.uncertainty import lattice_uncertainty
 from lfstereo.progress import Progress, silent
 
 _LEAST_SIDE_PITCHES = 12
@@ -58,15 +62,14 @@ def fit_grid(white: Capture, options: GridOptions = GridOptions(), progress: Pro
             f"{white.source}: found a mean brightness of {brightness:.3f} of full scale, a white image has at least "
             f"{options.least_brightness:g}; is it a dark frame?"
         )
-    lattice, centres, residual, quality = _fit(white, options, options.white_shading_per_px, progress)
-    unevenness = _unevenness(white, lattice)
+    fit = _fit(white, options, options.white_shading_per_px, progress)
+    unevenness = _unevenness(white, fit.lattice)
     if unevenness > options.largest_unevenness:
         raise GridFitError(
             f"{white.source}: brightness differs by {100 * unevenness:.0f} % between neighbouring lenslets, a white "
             f"image stays below {100 * options.largest_unevenness:.0f} %; give the frame of an evenly lit white surface"
         )
-    _refuse_disagreement(white.source, quality, options.least_quality, len(centres.amplitude))
-    return to_grid(lattice, _shape(white), _nominal_pitch(white), residual, quality, "white image")
+    return _trusted_grid(white, fit, options, options.least_quality, "white image")
 
 
 def estimate_grid_from_photograph(
@@ -93,14 +96,61 @@ def estimate_grid_from_photograph(
     ShapeError
         If the frame is smaller than a dozen lenslets.
     """
-    lattice, centres, residual, quality = _fit(photograph, options, options.photograph_shading_per_px, progress)
-    _refuse_disagreement(photograph.source, quality, 0.5 * options.least_quality, len(centres.amplitude))
-    return to_grid(lattice, _shape(photograph), _nominal_pitch(photograph), residual, quality, "photograph")
+    fit = _fit(photograph, options, options.photograph_shading_per_px, progress)
+    return _trusted_grid(photograph, fit, options, 0.5 * options.least_quality, "photograph")
 
 
-def _fit(
-    capture: Capture, options: GridOptions, shading_per_px: float, progress: Progress
-) -> tuple[Lattice, Centres, float, float]:
+@dataclass(frozen=True, slots=True)
+class _Fit:
+    """A lattice and the centres that it was fitted to."""
+
+    lattice: Lattice
+    index: Float64
+    """``(N, 2)`` lattice coordinates of the measured centres."""
+    measured: Float64
+    """``(N, 2)`` (x, y) px."""
+    weight: Float64
+    """``(N,)`` confidence of each; 0 for those that the lattice was not fitted to."""
+    residual_px: float
+    quality: float
+
+    def left_over(self) -> Float64:
+        """Return ``(N, 2)`` (x, y) px from the lattice to the measured centres."""
+        return np.asarray(self.measured - self.lattice.origin - self.index @ self.lattice.matrix.T, np.float64)
+
+    def robust_weight(self) -> Float64:
+        """Return ``(N,)`` the weight that each centre has in the fit in the end."""
+        spread = max(self.residual_px / np.sqrt(2), 1e-6)
+        weight: Float64 = self.weight / (1 + (np.hypot(*self.left_over().T) / (3 * spread)) ** 2) ** 2
+        return weight
+
+
+def _trusted_grid(capture: Capture, fit: _Fit, options: GridOptions, least_quality: float, source: str) -> LensletGrid:
+    """Return the grid of a fit, unless too few lenslets agree or it is not known well enough."""
+    where = capture.source
+    if not fit.quality >= least_quality:
+        raise GridFitError(
+            f"{where}: only {100 * fit.quality:.0f} % of {len(fit.index)} lenslets agree with one regular grid, "
+            f"expected at least {100 * least_quality:.0f} %; the frame is damaged, dark or not from a lenslet camera"
+        )
+    shape = int(capture.mosaic.shape[0]), int(capture.mosaic.shape[1])
+    weight = fit.robust_weight()
+    used = weight > 0
+    uncertainty = lattice_uncertainty(fit.lattice, fit.index[used], fit.measured[used], weight[used], shape)
+    if uncertainty > options.largest_uncertainty_px:
+        raise GridFitError(
+            f"{where}: the lenslet grid is known to {uncertainty:.2f} px only, expected "
+            f"{options.largest_uncertainty_px:g} px or better; give a white image, or a better lit picture"
+        )
+    field = None
+    if options.field_degree:
+        places = fit.measured[used]
+        field, _ = fit_smooth_field(places, fit.left_over()[used], weight[used], options.field_degree, shape)
+    nominal = _nominal_pitch(capture)
+    return to_grid(fit.lattice, shape, nominal, fit.residual_px, fit.quality, source, uncertainty, field)
+
+
+def _fit(capture: Capture, options: GridOptions, shading_per_px: float, progress: Progress) -> _Fit:
     nominal = _nominal_pitch(capture)
     side = min(capture.mosaic.shape)
     if capture.mosaic.ndim != 2 or side < _LEAST_SIDE_PITCHES * np.clip(nominal, 6, 20):
@@ -116,7 +166,7 @@ def _fit(
     progress(2, steps)
     for n in range(options.passes):
         before = lattice
-        lattice = _improve(flat, exposed, lattice, options, shading_per_px, _CENTRES_PER_ROUND)[0]
+        lattice = _improve(flat, exposed, lattice, options, shading_per_px, _CENTRES_PER_ROUND).lattice
         progress(3 + n, steps)
         if _largest_move(before, lattice, flat.shape) < _CONVERGED_PX:
             break
@@ -146,8 +196,8 @@ def _well_exposed(capture: Capture, pitch: float) -> Bool:
 
 def _improve(
     flat: Float32, exposed: Bool, lattice: Lattice, options: GridOptions, shading_per_px: float, most: int
-) -> tuple[Lattice, Centres, float, float]:
-    """Measure up to ``most`` centres and fit the lattice anew; also return RMS and agreement."""
+) -> _Fit:
+    """Measure up to ``most`` centres and fit the lattice anew."""
     radius = _FIT_RADIUS_PITCHES * lattice.pitch
     height, width = flat.shape
     index = lattice.indices_inside((height, width), radius + 2)
@@ -164,13 +214,13 @@ def _improve(
     middle = np.array([width - 1, height - 1]) / 2
     field = np.hypot(*(expected - middle).T) / np.hypot(*middle)
     usable = (np.hypot(*centres.displacement.T) < 0.35 * lattice.pitch) & (field < options.trusted_field)
+    weight = np.where(usable, 1 / np.maximum(centres.misfit, 1e-3) ** 2, 0)
     if usable.sum() < _LEAST_CENTRES:
-        return lattice, centres, float("inf"), 0.0
-    weight = 1 / np.maximum(centres.misfit[usable], 1e-3) ** 2
-    fitted, residual = robust_affine(index[usable], measured[usable], weight)
+        return _Fit(lattice, index, measured, weight, residual_px=float("inf"), quality=0.0)
+    fitted, residual = robust_affine(index[usable], measured[usable], weight[usable])
     distance = np.hypot(*(measured - fitted.origin - index @ fitted.matrix.T).T)
     agree = distance < _AGREEMENT_PITCHES * lattice.pitch
-    return fitted, centres, residual, float(agree.mean())
+    return _Fit(fitted, index, measured, weight, residual, float(agree.mean()))
 
 
 def robust_affine(index: Float64, points: Float64, weight: Float64) -> tuple[Lattice, float]:
@@ -225,17 +275,5 @@ def _unevenness(white: Capture, lattice: Lattice) -> float:
     return float(np.median(change[same]))
 
 
-def _refuse_disagreement(where: str, quality: float, least: float, count: int) -> None:
-    if not quality >= least:
-        raise GridFitError(
-            f"{where}: only {100 * quality:.0f} % of {count} lenslets agree with one regular grid, expected at least "
-            f"{100 * least:.0f} %; the frame is damaged, dark or not from a lenslet camera"
-        )
-
-
 def _nominal_pitch(capture: Capture) -> float:
     return capture.metadata.lenslets.pitch_m / capture.metadata.pixel_pitch_m
-
-
-def _shape(capture: Capture) -> tuple[int, int]:
-    return int(capture.mosaic.shape[0]), int(capture.mosaic.shape[1])

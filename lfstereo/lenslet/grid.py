@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from lfstereo.arrays import Float64
+from lfstereo.lenslet.smooth_field import SmoothField
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,13 +36,17 @@ class LensletGrid:
     quality: float
     """0..1: share of expected lenslets whose measured centre agrees with the lattice."""
     source: str
-    """``"white image"``, ``"photograph"`` or ``"given"``."""
+    """``"white image"``, ``"white images"`` (interpolated between them), ``"photograph"`` or ``"given"``."""
+    uncertainty_px: float | None = None
+    """Standard error of a lattice point, mean over the sensor; ``None`` where nothing was measured."""
+    field: SmoothField | None = None
+    """How the micro-images' centres depart from the straight lattice, where that was asked for."""
 
     def centres(self) -> Float64:
-        """Return all centres as ``(rows, columns, 2)``, (x, y) in px."""
+        """Return all centres as ``(rows, columns, 2)``, (x, y) in px, the smooth field included."""
         v, u = np.mgrid[: self.rows, : self.columns].astype(np.float64)
         shifted = (np.arange(self.rows)[:, None] + self.first_shifted_row) % 2 == 0
         u = u + 0.5 * shifted
         step_u, step_v = np.asarray(self.step_u_px), np.asarray(self.step_v_px)
         centres: Float64 = np.asarray(self.origin_px) + u[..., None] * step_u + v[..., None] * step_v
-        return centres
+        return centres if self.field is None else centres + self.field.at(centres)

@@ -8,6 +8,7 @@ import numpy as np
 
 from lfstereo.arrays import Float64
 from lfstereo.lenslet.grid import LensletGrid
+from lfstereo.lenslet.smooth_field import SmoothField
 
 _SAME_PITCH = 0.02
 
@@ -66,6 +67,8 @@ def to_grid(
     residual_px: float,
     quality: float,
     source: str,
+    uncertainty_px: float | None = None,
+    field: SmoothField | None = None,
 ) -> LensletGrid:
     """Choose the rows and columns that fill a sensor and number them from its top-left corner.
 
@@ -81,7 +84,7 @@ def to_grid(
         (height, width) of the sensor.
     nominal_pitch_px
         Pitch that the camera's metadata give; not used where it is more than 2 % off the fitted one.
-    residual_px, quality, source
+    residual_px, quality, source, uncertainty_px, field
         Passed on to the grid.
     """
     height, width = shape
@@ -111,4 +114,6 @@ def to_grid(
         residual_px=residual_px,
         quality=quality,
         source=source,
+        uncertainty_px=uncertainty_px,
+        field=field,
     )

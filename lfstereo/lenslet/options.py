@@ -19,3 +19,6 @@ class GridOptions:
     least_quality: float = option(0.5, "smallest share of lenslets that must agree with the lattice")
     largest_unevenness: float = option(0.12, "largest median brightness change between neighbours in a white image")
     least_brightness: float = option(0.03, "smallest mean brightness of a white image, white level = 1")
+    largest_uncertainty_px: float = option(0.3, "largest standard error of the lattice over the sensor", "px")
+    field_degree: int = option(0, "degree of a smooth departure from the straight lattice; 0 = straight")
+    largest_offset_px: float = option(0.5, "largest distance of a white image's grid from a picture's own", "px")

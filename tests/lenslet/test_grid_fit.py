@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 import pytest
 from scipy.io import loadmat
@@ -162,3 +163,32 @@ def test_real_photographs_without_white_image(real_data: Path, number: int) -> N
     assert (grid.rows, grid.columns) == (382, 330)
     assert np.hypot(*row) == pytest.approx(9.93, abs=0.01)
     assert np.arctan2(row[1], row[0]) == pytest.approx(-4.91e-3, abs=5e-5)
+
+
+def test_bent_lattice_needs_the_smooth_field(draw_frame: Callable[..., Any]) -> None:
+    frame = draw_frame(shape=(500, 560))
+    y, x = np.mgrid[:500, :560].astype(np.float32)
+    # Every micro-image moves by up to 0.5 px, most in the corners of the frame.
+    bend = 0.5 * ((x / 280 - 1) ** 2).astype(np.float32)
+    green = replace(frame.capture.metadata, normalized_responses=(1.0, 1.0, 1.0, 1.0))
+    grey = draw_frame(shape=(500, 560), colour=(1.0, 1.0, 1.0)).capture.mosaic
+    moved = cv2.remap(grey.astype(np.float32), x - bend, y, cv2.INTER_CUBIC)
+    capture = replace(frame.capture, mosaic=np.round(moved).astype(np.uint16), metadata=green)
+    inner = np.s_[2:-2, 2:-2]
+
+    def error(options: GridOptions) -> float:
+        centres = fit_grid(capture, options).centres()[inner].reshape(-1, 2)
+        true_shift = np.stack([0.5 * (centres[:, 0] / 280 - 1) ** 2, np.zeros(len(centres))], axis=1)
+        return rms(frame.lattice_error(centres - true_shift))
+
+    everywhere = GridOptions(trusted_field=1.0)
+    assert error(everywhere) > 0.1
+    # Displacements are measured to first order, a tenth of them remains.
+    assert error(replace(everywhere, field_degree=2)) < 0.05
+
+
+def test_grid_that_is_not_known_well_is_refused(draw_frame: Callable[..., Any]) -> None:
+    frame = draw_frame()
+    assert 0 < (fit_grid(frame.capture).uncertainty_px or 0) < WHITE_RMS_PX
+    with pytest.raises(GridFitError, match=r"known to 0\.00 px only, expected 1e-05 px or better"):
+        fit_grid(frame.capture, GridOptions(largest_uncertainty_px=1e-5))
