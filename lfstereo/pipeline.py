@@ -18,7 +18,7 @@ from lfstereo.focus.refocus import render_stack, slice_disparities
 from lfstereo.focus.stack import FocalStack
 from lfstereo.lenslet.white import find_white_image
 from lfstereo.lightfield.decoding import decode
-from lfstereo.lightfield.field import LightField
+from lfstereo.lightfield.field import LightField, in_srgb
 from lfstereo.lightfield.samples import ViewSamples, sample_views
 from lfstereo.lightfield.store import read_light_field
 from lfstereo.options import option
@@ -31,7 +31,7 @@ from lfstereo.rig.view_maps import common_view_baseline_m
 if TYPE_CHECKING:
     from lfstereo.network.estimate import Network
 
-CAPTURE_SUFFIXES = (".lfr", ".lfp", ".raw")
+CAPTURE_SUFFIXES = (".lfr", ".lfp", ".raw", ".dng")
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,7 +177,7 @@ def open_light_field(path: Path, whites: Path | None, progress: Progress = silen
         If a raw capture is given without a folder of white images.
     """
     if path.is_dir() or path.suffix.lower() not in CAPTURE_SUFFIXES:
-        return read_light_field(path)
+        return in_srgb(read_light_field(path))
     capture = read_capture(path)
     if whites is None:
         raise AssetError(f"{path}: a raw capture needs the camera's white images; give their folder with --whites")

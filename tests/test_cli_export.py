@@ -13,7 +13,7 @@ import pytest
 import rawpy
 
 from lfstereo.cli.main import main
-from lfstereo.container import write_capture
+from lfstereo.container import read_capture, write_capture
 from lfstereo.lightfield import LightField, ViewSampling, read_light_field, write_light_field
 from lfstereo.rig.rig import PlenopticCamera, StereoRig, write_rig
 
@@ -33,6 +33,7 @@ def scene(tmp_path: Path) -> Path:
         ("a.png", []),
         ("views", []),
         ("views", ["--format", "tiff"]),
+        ("views", ["--format", "tiff", "--colour-space", "linear", "--exposure-ev", "-1"]),
         ("views", ["--format", "hci"]),
         ("again.h5", ["--force"]),
     ],
@@ -47,12 +48,16 @@ def test_light_field_to_each_format_and_back(scene: Path, name: str, words: list
     np.testing.assert_allclose(read_light_field(scene.parent / "back.h5").views, first.views, atol=0.005)
 
 
-def test_capture_to_dng(tmp_path: Path, draw_frame: Callable[..., Any]) -> None:
+def test_capture_to_dng(tmp_path: Path, draw_frame: Callable[..., Any], capsys: pytest.CaptureFixture[str]) -> None:
     capture = draw_frame(shape=(200, 240)).capture
     write_capture(tmp_path / "photo.LFR", capture)
     assert main(["export", str(tmp_path / "photo.LFR"), "-o", str(tmp_path / "photo.dng")]) == 0
     with rawpy.imread(str(tmp_path / "photo.dng")) as raw:
         np.testing.assert_array_equal(raw.raw_image, capture.mosaic)
+    np.testing.assert_array_equal(read_capture(tmp_path / "photo.dng").mosaic, capture.mosaic)
+    words = ["export", str(tmp_path / "photo.LFR"), "-o", str(tmp_path / "b.dng"), "--colour-space", "prophoto"]
+    assert main(words) == 3
+    assert "expected none for a raw mosaic" in capsys.readouterr().err
 
 
 @pytest.fixture
@@ -97,6 +102,7 @@ def test_rig_that_does_not_fit(scene: Path, rig: Path, capsys: pytest.CaptureFix
         ("photo.LFR", "a.tif", ["--format", "dng"], "found the suffix '.tif', expected .dng"),
         ("scene.h5", "a.jpg", [], "found the suffix '.jpg', expected .h5, .mat, .png (ESLF), .dng"),
         ("scene.h5", "scene.h5", [], "exists already"),
+        ("scene.h5", "a.mat", ["--colour-space", "display-p3"], "format mat: found options of pictures"),
         ("none.h5", "a.mat", [], "found no such file"),
     ],
 )

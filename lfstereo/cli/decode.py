@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 def configure(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument("capture", type=Path, help="LFR, LFP or RAW capture, or with --camera an image of its mosaic")
+    parser.add_argument("capture", type=Path, help="LFR, LFP, RAW or DNG capture, or with --camera an image of its mosaic")
     parser.add_argument("--whites", type=Path, help="folder with the camera's white images, or one white image")
     parser.add_argument("--camera", help="camera of a mosaic stored as an image: lytro-f01 or lytro-illum")
     parser.add_argument(
@@ -111,9 +111,10 @@ def _write_preview(path: Path, light_field: LightField, framed: Capture, grid: L
     import cv2
 
     from lfstereo.lenslet.overlay import draw_grid
+    from lfstereo.lightfield.field import in_srgb
     from lfstereo.lightfield.views import montage
 
-    picture = montage(light_field, draw_grid(framed, grid))
+    picture = montage(in_srgb(light_field), draw_grid(framed, grid))
     encoded = cv2.imencode(".png", picture[..., ::-1])[1]
     with atomic_file(path, force) as scratch:
         scratch.write_bytes(encoded.tobytes())

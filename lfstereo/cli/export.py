@@ -8,6 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from lfstereo.errors import ConfigError
+from lfstereo.lightfield.options import PictureOptions
+from lfstereo.options import add_arguments, from_arguments
 from lfstereo.outputs import check_absent
 from lfstereo.progress import StageClock
 
@@ -35,6 +37,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--rig", type=Path, help="rig file: lets depth be told from the disparities of an HCI folder")
     parser.add_argument("--side", choices=("left", "right"), default="left", help="camera of the rig (default: left)")
     parser.add_argument("--force", action="store_true", help="replace an output that exists")
+    add_arguments(parser, PictureOptions)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -47,32 +50,38 @@ def run(arguments: argparse.Namespace) -> int:
         wanted = "a raw capture (.LFR, .LFP, .RAW)" if to_dng else "a light field; decode it first ('lfstereo decode')"
         raise ConfigError(f"{source}: found the suffix '{source.suffix}', expected {wanted}, for {target}")
     clock = StageClock(bars=sys.stderr.isatty())
+    pictures = from_arguments(PictureOptions, arguments)
     if to_dng:
+        if pictures != PictureOptions():
+            raise ConfigError(f"{target}: found options of pictures ({pictures}), expected none for a raw mosaic")
         _export_capture(source, target, arguments.force, clock)
     else:
-        _export_views(arguments, clock)
+        _export_views(arguments, pictures, clock)
     print(f"written: {target}")
     return 0
 
 
 def _export_capture(source: Path, target: Path, force: bool, clock: StageClock) -> None:
-    from lfstereo.container.capture import read_capture
-    from lfstereo.container.dng import SUFFIX, write_dng
+    from lfstereo.container.capture import DNG_SUFFIX, read_capture
+    from lfstereo.container.dng import write_dng
 
-    if target.suffix.lower() != SUFFIX:
-        raise ConfigError(f"{target}: found the suffix '{target.suffix}', expected {SUFFIX} for format dng; rename it")
+    if target.suffix.lower() != DNG_SUFFIX:
+        raise ConfigError(
+            f"{target}: found the suffix '{target.suffix}', expected {DNG_SUFFIX} for format dng; rename it"
+        )
     with clock.stage("read"):
         capture = read_capture(source)
     with clock.stage("write"):
         write_dng(target, capture, force)
 
 
-def _export_views(arguments: argparse.Namespace, clock: StageClock) -> None:
-    from lfstereo.lightfield.interchange.formats import choose_format, export_light_field
+def _export_views(arguments: argparse.Namespace, pictures: PictureOptions, clock: StageClock) -> None:
+    from lfstereo.lightfield.interchange.formats import check_pictures, choose_format, export_light_field
     from lfstereo.lightfield.interchange.picture_folders import write_hci_folder
     from lfstereo.lightfield.store import read_light_field
 
     name = choose_format(arguments.output, arguments.format)
+    check_pictures(name, pictures)
     if arguments.rig is not None and name != "hci":
         raise ConfigError(f"--rig: found the format {name}, expected hci; leave --rig out")
     with clock.stage("read"):
@@ -80,9 +89,9 @@ def _export_views(arguments: argparse.Namespace, clock: StageClock) -> None:
         lengths = _lengths(arguments.rig, arguments.side, light_field) if arguments.rig is not None else None
     with clock.stage("write") as progress:
         if lengths is not None:
-            write_hci_folder(arguments.output, light_field, arguments.force, progress, lengths)
+            write_hci_folder(arguments.output, light_field, arguments.force, progress, pictures, lengths)
             return
-        export_light_field(arguments.output, light_field, name, arguments.force, progress)
+        export_light_field(arguments.output, light_field, name, arguments.force, progress, pictures)
 
 
 def _lengths(path: Path, side: str, light_field: LightField) -> HciLengths:

@@ -16,6 +16,7 @@ from lfstereo.errors import ContainerError
 
 CONTAINER_SUFFIXES = (".lfr", ".lfp")
 BARE_SUFFIX = ".raw"
+DNG_SUFFIX = ".dng"
 SIDECAR_SUFFIXES = (".TXT", ".txt", ".json", ".JSON")
 IMAGE_SUFFIXES = (".jpg", ".jpeg", ".png", ".tif", ".tiff")
 
@@ -37,8 +38,8 @@ def read_capture(path: Path) -> Capture:
     Parameters
     ----------
     path
-        ``.LFR`` or ``.LFP`` container of either camera, or a bare ``.RAW`` with its ``.TXT`` or ``.json`` of the same
-        name beside it; upper or lower case.
+        ``.LFR`` or ``.LFP`` container of either camera, a bare ``.RAW`` with its ``.TXT`` or ``.json`` of the same
+        name beside it, or a ``.DNG`` that lfstereo wrote; upper or lower case.
 
     Raises
     ------
@@ -50,6 +51,10 @@ def read_capture(path: Path) -> Capture:
     suffix = path.suffix.lower()
     if suffix == BARE_SUFFIX:
         return _read_bare(path)
+    if suffix == DNG_SUFFIX:
+        from lfstereo.container.dng import read_dng
+
+        return read_dng(path)
     if suffix in IMAGE_SUFFIXES:
         raise ContainerError(
             f"{path}: found an image file, expected .LFR, .LFP or .RAW; if it is a mosaic, name its camera "

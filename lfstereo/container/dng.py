@@ -1,7 +1,8 @@
-"""Raw mosaics as DNG, which raw converters open."""
+"""Raw mosaics as DNG, which raw converters open, and back."""
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -10,11 +11,12 @@ import tifffile
 
 from lfstereo.arrays import Float64
 from lfstereo.container.capture import Capture
-from lfstereo.container.metadata import FrameMetadata
-from lfstereo.errors import MetadataError
+from lfstereo.container.layouts import frame_parameters, private_metadata, public_metadata
+from lfstereo.container.metadata import FrameMetadata, parse_metadata
+from lfstereo.container.reader import parse_json
+from lfstereo.errors import ContainerError, MetadataError
 from lfstereo.outputs import atomic_file, check_absent, check_space
 
-SUFFIX = ".dng"
 _BYTE, _ASCII, _SHORT, _RATIONAL, _SRATIONAL = 1, 2, 3, 5, 10
 _CFA_PHOTOMETRIC = 32803
 _D65_ILLUMINANT = 21
@@ -22,14 +24,20 @@ _COLOUR_CODES = {"r": 0, "g": 1, "b": 2}
 _XYZ_TO_SRGB = np.array(
     [[3.2404542, -1.5371385, -0.4985314], [-0.9692660, 1.8760108, 0.0415560], [0.0556434, -0.2040259, 1.0572252]]
 )
+_SRGB_TO_D50 = np.array(
+    [[0.4360747, 0.3850649, 0.1430804], [0.2225045, 0.7168786, 0.0606169], [0.0139322, 0.0971045, 0.7141733]]
+)
 _DENOMINATOR = 10000
+_PRIVATE_DATA = 50740
+_PRIVATE_NAME = b"lfstereo\0"
 
 
 def write_dng(path: Path, capture: Capture, force: bool = False) -> None:
     """Write the raw mosaic of a capture as an uncompressed DNG; the digital numbers stay as they are.
 
-    Bayer pattern, black and white levels, white balance, colour matrix and exposure bias of the camera go along, so
-    that a raw converter shows the lenslet image in the camera's colours.
+    Bayer pattern, black and white levels, white balance, colour matrices and exposure bias of the camera go along, so
+    that a raw converter shows the lenslet image in the camera's colours; and all of the metadata as the camera writes
+    them, for :func:`read_dng`.
 
     Raises
     ------
@@ -56,6 +64,42 @@ def write_dng(path: Path, capture: Capture, force: bool = False) -> None:
             software="lfstereo",
             extratags=tags,
         )
+
+
+def read_dng(path: Path) -> Capture:
+    """Read a capture from a DNG that :func:`write_dng` wrote.
+
+    Raises
+    ------
+    ContainerError
+        If the file is damaged, or another program wrote it: then it lacks what a decode needs to know of the lens.
+    MetadataError
+        If the metadata in it hold a value that cannot be.
+    """
+    try:
+        with tifffile.TiffFile(path) as file:
+            page = file.pages.first
+            private = page.tags.valueof(_PRIVATE_DATA)
+            mosaic = np.asarray(page.asarray()) if isinstance(private, bytes) else None
+    except Exception as error:  # damaged files fail in many ways there
+        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
+        raise ContainerError(f"{path}: not a readable DNG ({reason}); export the capture again") from error
+    if mosaic is None or not private.startswith(_PRIVATE_NAME):
+        raise ContainerError(
+            f"{path}: found a DNG without a light-field camera's metadata, expected one that lfstereo wrote; give the "
+            "camera's own file"
+        )
+    stored = parse_json(private[len(_PRIVATE_NAME) :], f"{path}: private data")
+    public, own = stored.get("public"), stored.get("private")
+    if not isinstance(public, dict) or not isinstance(own, dict):
+        raise ContainerError(f"{path}: found private data without metadata, expected both; export the capture again")
+    metadata = parse_metadata(public, own, str(path))
+    if mosaic.dtype != np.uint16 or mosaic.shape != (metadata.height, metadata.width):
+        raise ContainerError(
+            f"{path}: found a mosaic of {mosaic.dtype} with shape {mosaic.shape}, expected uint16 of "
+            f"{metadata.height} x {metadata.width} as its metadata say; export the capture again"
+        )
+    return Capture(mosaic, metadata, str(path))
 
 
 def colour_matrix(metadata: FrameMetadata, where: str) -> Float64:
@@ -90,6 +134,10 @@ def _tags(metadata: FrameMetadata, where: str) -> list[tuple[int, int, int, Any,
     black = [by_site[site][0] for site in sites]
     matrix = colour_matrix(m, where)
     neutral = 1 / _gains(m)
+    ccm = np.asarray(m.ccm, np.float64).reshape(3, 3)
+    forward = _SRGB_TO_D50 @ (ccm / ccm.sum(1, keepdims=True))
+    public = public_metadata(m) | {"parameters": frame_parameters(m)}
+    private = _PRIVATE_NAME + json.dumps({"public": public, "private": private_metadata(m)}).encode("utf-8")
     name = f"Lytro {m.model}"
     tags: list[tuple[int, int, int, Any, bool]] = [
         (271, _ASCII, 0, m.make or "Lytro, Inc.", True),
@@ -106,7 +154,9 @@ def _tags(metadata: FrameMetadata, where: str) -> list[tuple[int, int, int, Any,
         (50721, _SRATIONAL, 9, _fractions(matrix.ravel()), True),
         (50728, _RATIONAL, 3, _fractions(neutral), True),
         (50730, _SRATIONAL, 1, _fractions([m.exposure_bias_ev]), True),
+        (_PRIVATE_DATA, _BYTE, len(private), private, True),
         (50778, _SHORT, 1, _D65_ILLUMINANT, True),
+        (50964, _SRATIONAL, 9, _fractions(forward.ravel()), True),
     ]
     if m.serial:
         tags.append((50735, _ASCII, 0, m.serial, True))

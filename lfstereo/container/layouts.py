@@ -47,7 +47,7 @@ def sidecar_metadata(metadata: FrameMetadata) -> Json:
             "picture": {
                 "viewArray": [],
                 "accelerationArray": [],
-                "frameArray": [{"frame": frame, "parameters": _parameters(metadata)}],
+                "frameArray": [{"frame": frame, "parameters": frame_parameters(metadata)}],
                 "derivationArray": [],
             },
             "thumbnailArray": [],
@@ -59,7 +59,7 @@ def f01_toc(metadata: FrameMetadata, references: dict[str, str]) -> Json:
     """Return the table of contents of an F01 picture from its references (``imageRef`` and so on)."""
     return {
         "picture": {
-            "frameArray": [{"frame": references, "parameters": _parameters(metadata)}],
+            "frameArray": [{"frame": references, "parameters": frame_parameters(metadata)}],
             "viewArray": [{"type": "com.lytro.stars", "vendorContent": {"starred": False}}],
             "accelerationArray": [],
             "derivationArray": [],
@@ -73,7 +73,7 @@ def illum_toc(metadata: FrameMetadata, references: dict[str, str], thumbnail: Js
     """Return the table of contents of an Illum picture from its references and the entry of its thumbnail."""
     entry: Json = {"assignedProperties": {}, "accelerations": [], "frame": references}
     if metadata.is_white_image or metadata.is_dark_frame:
-        entry["parameters"] = _parameters(metadata)
+        entry["parameters"] = frame_parameters(metadata)
     return {
         "schema": f"{_SCHEMAS}/picture/2.1.6/picture_schema.json",
         "generators": [GENERATOR],
@@ -85,7 +85,7 @@ def illum_toc(metadata: FrameMetadata, references: dict[str, str], thumbnail: Js
     }
 
 
-def _parameters(metadata: FrameMetadata) -> Json:
+def frame_parameters(metadata: FrameMetadata) -> Json:
     tags = {"darkFrame": metadata.is_dark_frame, "modulationFrame": metadata.is_white_image}
     return {"vendorContent": {"com.lytro.tags": tags}}
 

@@ -4,16 +4,12 @@ from __future__ import annotations
 
 import warnings
 from functools import cache
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
 from lfstereo.arrays import Float32, Float64
-
-Primaries = Literal["srgb", "display-p3", "prophoto"]
-"""What the three numbers of linear light stand for."""
-ColourSpace = Literal["srgb", "linear", "display-p3", "prophoto"]
-"""Primaries and transfer curve of a picture; ``linear`` has those of sRGB and no curve."""
+from lfstereo.develop.options import ColourSpace, Primaries
 
 PRIMARIES: dict[ColourSpace, Primaries] = {
     "srgb": "srgb",

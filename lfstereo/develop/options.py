@@ -5,9 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from lfstereo.develop.colour_spaces import Primaries
 from lfstereo.options import option
 
+Primaries = Literal["srgb", "display-p3", "prophoto"]
+"""What the three numbers of linear light stand for."""
+ColourSpace = Literal["srgb", "linear", "display-p3", "prophoto"]
+"""Primaries and transfer curve of a picture; ``linear`` has those of sRGB and no curve."""
 DemosaicMethod = Literal["malvar2004", "bilinear"]
 
 

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
 
 from lfstereo.arrays import UInt8, Views, check_shape
-from lfstereo.develop.colour_spaces import Primaries
+from lfstereo.develop.colour_spaces import conversion
+from lfstereo.develop.options import Primaries
 from lfstereo.errors import ShapeError
 
 
@@ -55,3 +59,14 @@ class LightField:
     def centre(self) -> tuple[int, int]:
         """Row and column ``(t0, s0)`` of the centre view."""
         return self.views.shape[0] // 2, self.views.shape[1] // 2
+
+
+def in_srgb(light_field: LightField) -> LightField:
+    """Return a light field in linear sRGB; colours outside are cut off at 0."""
+    if light_field.colour_space == "srgb":
+        return light_field
+    matrix = conversion(light_field.colour_space, "srgb")
+    views = np.empty_like(light_field.views)
+    for place in np.ndindex(views.shape[:2]):
+        views[place] = np.maximum(cv2.transform(light_field.views[place], matrix), 0)
+    return replace(light_field, views=views, colour_space="srgb")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Literal
 
-from lfstereo.develop.options import DevelopOptions
+from lfstereo.develop.options import ColourSpace, DevelopOptions
 from lfstereo.lenslet.options import GridOptions
 from lfstereo.options import option
 
@@ -30,3 +30,12 @@ class DecodeOptions:
     view: ViewOptions = field(default_factory=ViewOptions)
     grid: GridOptions = field(default_factory=GridOptions)
     develop: DevelopOptions = field(default_factory=DevelopOptions)
+
+
+@dataclass(frozen=True, slots=True)
+class PictureOptions:
+    """How the linear light of a view becomes a picture."""
+
+    colour_space: ColourSpace = option("srgb", "primaries and curve of the pictures")
+    highlights: Literal["clip", "soft"] = option("clip", "values above white: cut off, or bent below it from 0.8 on")
+    exposure_ev: float = option(0.0, "brighten the pictures; negative makes room for highlights above white", "EV")

@@ -9,6 +9,8 @@ from typing import Any
 import h5py
 import numpy as np
 
+from lfstereo.develop.colour_spaces import PRIMARIES
+from lfstereo.develop.options import Primaries
 from lfstereo.errors import ContainerError
 from lfstereo.lightfield.encoding import from_codes, to_codes
 from lfstereo.lightfield.field import LightField, ViewSampling
@@ -61,7 +63,8 @@ def write_light_field(path: Path, light_field: LightField, force: bool = False) 
     """Write a light field to one HDF5 file; it appears whole or not at all.
 
     The dataset ``views`` holds the square root of the linear values as 16-bit codes, so that values above 1
-    survive and dark ones keep at least 13 bits; ``weight`` is stored as it is. Both are chunked per view.
+    survive and dark ones keep at least 13 bits: ``peak * (code / 65535)^2``. ``weight`` is stored as it is. Both are
+    chunked per view. MATLAB and Octave read them with the axes the other way round.
 
     Parameters
     ----------
@@ -93,6 +96,9 @@ def write_light_field(path: Path, light_field: LightField, force: bool = False) 
             chunks = (1, 1, *views.shape[2:4])
             file.create_dataset("weight", data=light_field.weight, chunks=chunks)
         file.attrs["format"], file.attrs["version"] = FORMAT_NAME, FORMAT_VERSION
+        file.attrs["colour_space"] = light_field.colour_space
+        # For programs that read no attributes, such as Octave: views = peak * (codes / 65535)^2.
+        file.create_dataset("peak", data=np.float64(peak))
         file.attrs["serial"], file.attrs["source"] = light_field.serial, light_field.source
         for name in _STEPS:
             if getattr(light_field, name) is not None:
@@ -147,6 +153,7 @@ def _read(file: Any, path: Path) -> LightField:
         source=str(path),
         zoom_step=_step(file, "zoom_step", path),
         focus_step=_step(file, "focus_step", path),
+        colour_space=_primaries(file, path),
     )
 
 
@@ -191,6 +198,17 @@ def _sampling(file: Any, path: Path) -> ViewSampling | None:
         rotation_rad=values["rotation_rad"][0],
         view_step_px=values["view_step_px"][0],
     )
+
+
+def _primaries(file: Any, path: Path) -> Primaries:
+    found = file.attrs.get("colour_space", "srgb")
+    if found not in PRIMARIES.values():
+        raise ContainerError(
+            f"{path}: found colour space {found!r}, expected {', '.join(sorted(set(PRIMARIES.values())))}; decode the "
+            "capture again with this version of lfstereo"
+        )
+    primaries: Primaries = found
+    return primaries
 
 
 def _step(file: Any, name: str, path: Path) -> int | None:

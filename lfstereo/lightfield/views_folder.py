@@ -10,10 +10,14 @@ import cv2
 import numpy as np
 
 from lfstereo.arrays import Rgb, UInt8, UInt16
+from lfstereo.develop.colour_spaces import PRIMARIES
+from lfstereo.develop.options import Primaries
 from lfstereo.errors import ContainerError, ShapeError
-from lfstereo.lightfield.encoding import srgb8, srgb_to_linear
+from lfstereo.lightfield.encoding import from_picture, to_picture
 from lfstereo.lightfield.field import LightField
-from lfstereo.lightfield.interchange.description import FILE_NAME, to_text
+from lfstereo.lightfield.interchange.description import FILE_NAME, PLAIN, Description, to_text
+from lfstereo.lightfield.interchange.png_chunks import HEAD_BYTES, colour_chunk
+from lfstereo.lightfield.options import PictureOptions
 from lfstereo.outputs import atomic_folder
 from lfstereo.progress import Progress, silent
 
@@ -22,11 +26,13 @@ _ROW_COLUMN = re.compile(r"(?:^|[^0-9])(\d{1,3})[_-](\d{1,3})$")
 _COUNTED = re.compile(r"(?:cam|view|im|img)_?(\d{2,4})$", re.IGNORECASE)
 
 
-def read_views_folder(folder: Path, count: tuple[int, int] | None = None) -> LightField:
+def read_views_folder(
+    folder: Path, count: tuple[int, int] | None = None, found: Description | None = None
+) -> LightField:
     """Read a folder of views named by row and column, or numbered row by row.
 
     ``..._RR_CC.png`` (row first, counted from 0 or 1) and the HCI benchmark's ``input_Cam000.png`` to
-    ``input_Cam080.png`` (a square number of views) are understood; values are taken as sRGB.
+    ``input_Cam080.png`` (a square number of views) are understood; values are taken as sRGB unless told otherwise.
 
     Parameters
     ----------
@@ -34,6 +40,8 @@ def read_views_folder(folder: Path, count: tuple[int, int] | None = None) -> Lig
         The folder.
     count
         Rows and columns of numbered views, where they are known; ``None`` takes them for a square.
+    found
+        What was written beside the views: here their colour space and exposure.
 
     Returns
     -------
@@ -55,6 +63,8 @@ def read_views_folder(folder: Path, count: tuple[int, int] | None = None) -> Lig
             f"{folder}: found {len(paths)} views, expected {rows} x {columns}; row {t}, column {s} (counted from 0) is "
             f"the first of {len(missing)} missing"
         )
+    space = PLAIN.colour_space if found is None else found.colour_space
+    exposure_ev = 0.0 if found is None else found.exposure_ev
     views: np.ndarray[tuple[int, ...], np.dtype[np.float32]] | None = None
     for (t, s), path in sorted(paths.items()):
         picture = _read_picture(path)
@@ -62,13 +72,21 @@ def read_views_folder(folder: Path, count: tuple[int, int] | None = None) -> Lig
             views = np.empty((rows, columns, *picture.shape), np.float32)
         if picture.shape != views.shape[2:]:
             raise ShapeError(f"{path}: found a view of shape {picture.shape}, expected {views.shape[2:]} as the others")
-        views[t, s] = srgb_to_linear(picture)
+        views[t, s] = from_picture(picture, space, exposure_ev)
     assert views is not None
-    return LightField(views=views, weight=None, sampling=None, serial="", source=str(folder))
+    return LightField(
+        views=views, weight=None, sampling=None, serial="", source=str(folder), colour_space=PRIMARIES[space]
+    )
 
 
-def write_views_folder(folder: Path, light_field: LightField, force: bool = False, progress: Progress = silent) -> None:
-    """Write each view as ``view_TT_SS.png``, 8-bit sRGB, and what they do not say as TOML; values above 1 are clipped.
+def write_views_folder(
+    folder: Path,
+    light_field: LightField,
+    force: bool = False,
+    progress: Progress = silent,
+    pictures: PictureOptions = PLAIN,
+) -> None:
+    """Write each view as ``view_TT_SS.png``, 8 bits, and what they do not say as TOML.
 
     Raises
     ------
@@ -79,21 +97,25 @@ def write_views_folder(folder: Path, light_field: LightField, force: bool = Fals
     with atomic_folder(folder, force) as scratch:
         for t in range(rows):
             for s in range(columns):
-                write_png(scratch / f"view_{t:02d}_{s:02d}.png", light_field.views[t, s])
+                view = light_field.views[t, s]
+                write_png(scratch / f"view_{t:02d}_{s:02d}.png", view, light_field.colour_space, pictures)
                 progress(t * columns + s + 1, rows * columns)
-        (scratch / FILE_NAME).write_text(to_text(light_field), "utf-8")
+        (scratch / FILE_NAME).write_text(to_text(light_field, pictures), "utf-8")
 
 
-def write_png(path: Path, view: Rgb) -> None:
-    """Write one view as 8-bit sRGB.
+def write_png(path: Path, view: Rgb, primaries: Primaries = "srgb", pictures: PictureOptions = PLAIN) -> None:
+    """Write one view with 8 bits, its colour space named.
 
     Raises
     ------
     OSError
         If it cannot be written.
     """
-    if not cv2.imwrite(str(path), srgb8(view)[..., ::-1]):
-        raise OSError(f"{path}: a view could not be written")
+    coded = np.rint(to_picture(view, primaries, pictures) * np.float32(255)).astype(np.uint8)
+    encoded = cv2.imencode(".png", coded[..., ::-1])[1]
+    with path.open("wb") as file:
+        file.write(encoded[:HEAD_BYTES].tobytes() + colour_chunk(pictures.colour_space))
+        file.write(encoded[HEAD_BYTES:].data)
 
 
 def _numbered(folder: Path, count: tuple[int, int] | None) -> dict[tuple[int, int], Path]:

@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 import pytest
 import rawpy
+import tifffile
 
-from lfstereo.container import Capture
+from lfstereo.container import Capture, read_capture
 from lfstereo.container.dng import colour_matrix, write_dng
 from lfstereo.container.mosaic_image import read_camera_profile
-from lfstereo.errors import MetadataError, OutputError
+from lfstereo.errors import ContainerError, MetadataError, OutputError
 
 SHAPE = (200, 240)
 
@@ -71,6 +72,48 @@ def test_white_is_the_neutral_colour() -> None:
     metadata = capture_of("lytro-illum", ccm=(1.0, 0, 0, 0, 1.0, 0, 0, 0, 1.0), white_balance=(2.0, 1.0, 1.0, 4.0))
     d65 = np.array([0.95047, 1.0, 1.08883])
     assert colour_matrix(metadata.metadata, "x") @ d65 == pytest.approx([0.5, 1.0, 0.25], abs=1e-4)
+
+
+@pytest.mark.parametrize("camera", ["lytro-illum", "lytro-f01"])
+def test_round_trip(tmp_path: Path, camera: str) -> None:
+    capture = capture_of(camera, serial="B1", white_balance=(1.379, 1.0, 1.0, 1.148), is_white_image=True)
+    write_dng(tmp_path / "a.dng", capture)
+    found = read_capture(tmp_path / "a.dng")
+    np.testing.assert_array_equal(found.mosaic, capture.mosaic)
+    assert found.metadata == replace(capture.metadata, firmware=found.metadata.firmware)
+    assert found.source == str(tmp_path / "a.dng")
+
+
+def test_forward_matrix_makes_white_white(tmp_path: Path) -> None:
+    write_dng(tmp_path / "a.dng", capture_of("lytro-illum"))
+    with tifffile.TiffFile(tmp_path / "a.dng") as file:
+        numbers = np.array(file.pages.first.tags[50964].value, float)
+    matrix = (numbers[::2] / numbers[1::2]).reshape(3, 3)
+    assert matrix.sum(1) == pytest.approx([0.9642, 1.0, 0.8252], abs=5e-4)  # D50
+
+
+def test_dng_that_holds_no_light_field(tmp_path: Path) -> None:
+    (tmp_path / "text.dng").write_text("no picture")
+    with pytest.raises(ContainerError, match="not a readable DNG"):
+        read_capture(tmp_path / "text.dng")
+    tifffile.imwrite(tmp_path / "other.dng", np.zeros((4, 4), np.uint16))
+    with pytest.raises(ContainerError, match="found a DNG without a light-field camera's metadata"):
+        read_capture(tmp_path / "other.dng")
+    for content, match in ((b"[]", "private data"), (b'{"public": 1}', "found private data without metadata")):
+        private = b"lfstereo\0" + content
+        tifffile.imwrite(
+            tmp_path / "odd.dng", np.zeros((4, 4), np.uint16), extratags=[(50740, 1, len(private), private, True)]
+        )
+        with pytest.raises(ContainerError, match=match):
+            read_capture(tmp_path / "odd.dng")
+    capture = capture_of("lytro-illum")
+    write_dng(tmp_path / "small.dng", replace(capture, mosaic=capture.mosaic[:100]))
+    with pytest.raises(ContainerError, match=r"with shape \(100, 240\), expected uint16 of 200 x 240"):
+        read_capture(tmp_path / "small.dng")
+    write_dng(tmp_path / "cut.dng", capture)
+    (tmp_path / "cut.dng").write_bytes((tmp_path / "cut.dng").read_bytes()[:5000])
+    with pytest.raises(ContainerError, match=r"cut\.dng"):
+        read_capture(tmp_path / "cut.dng")
 
 
 def test_refusals(tmp_path: Path) -> None:

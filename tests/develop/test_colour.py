@@ -14,9 +14,9 @@ from lfstereo.container import Capture, FrameMetadata, read_container
 from lfstereo.container.capture import read_metadata
 from lfstereo.container.mosaic_image import read_camera_profile
 from lfstereo.develop.colour import camera_matrix
-from lfstereo.develop.colour_spaces import NAMES, ColourSpace, Primaries, conversion, decode_table, encode, to_d50
+from lfstereo.develop.colour_spaces import NAMES, conversion, decode_table, encode, to_d50
 from lfstereo.develop.develop import develop
-from lfstereo.develop.options import DevelopOptions
+from lfstereo.develop.options import ColourSpace, DevelopOptions, Primaries
 from lfstereo.errors import ConfigError, MetadataError
 
 SPACES: list[ColourSpace] = ["srgb", "linear", "display-p3", "prophoto"]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shutil
+import subprocess
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -42,6 +44,33 @@ def test_round_trip(stored: Path, light_field: LightField) -> None:
     assert found.views.max() == pytest.approx(7.5, abs=1e-4)
     assert np.array_equal(found.weight, light_field.weight)
     assert (found.sampling, found.serial, found.source) == (SAMPLING, "B51", str(stored))
+
+
+def test_colour_space_is_kept(tmp_path: Path, stored: Path, light_field: LightField) -> None:
+    write_light_field(tmp_path / "wide.h5", replace(light_field, colour_space="prophoto"))
+    assert read_light_field(tmp_path / "wide.h5").colour_space == "prophoto"
+    with h5py.File(stored, "r+") as file:
+        del file.attrs["colour_space"]  # as written before there was a choice
+    assert read_light_field(stored).colour_space == "srgb"
+    with h5py.File(stored, "r+") as file:
+        file.attrs["colour_space"] = "cmyk"
+    with pytest.raises(ContainerError, match="found colour space 'cmyk', expected display-p3, prophoto, srgb"):
+        read_light_field(stored)
+
+
+@pytest.mark.skipif(shutil.which("octave") is None, reason="GNU Octave is not installed")
+def test_octave_opens_it(stored: Path, light_field: LightField) -> None:
+    """Octave reads no attributes: what the codes mean is a variable."""
+    script = (
+        f"f = load('{stored}'); disp(size(f.views)); disp(class(f.views)); disp(double(f.weight(3, 2, 4, 1)));"
+        "printf('%.6f\\n', f.peak * (double(f.views(2, 8, 6, 5, 1)) / 65535) ^ 2)"
+    )
+    done = subprocess.run(["octave", "-q", "--eval", script], capture_output=True, text=True, check=True)
+    words = done.stdout.split()
+    assert words[:6] == ["3", "14", "12", "5", "3", "uint16"]
+    assert light_field.weight is not None
+    assert words[6] == str(light_field.weight[0, 3, 1, 2])
+    assert float(words[7]) == pytest.approx(float(light_field.views[0, 4, 5, 7, 1]), abs=1.3e-4)
 
 
 def test_twice_stored_is_the_same(stored: Path, tmp_path: Path) -> None:

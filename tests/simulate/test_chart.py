@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lfstereo.develop.colour_spaces import Primaries, conversion
-from lfstereo.develop.options import DevelopOptions
+from lfstereo.develop.colour_spaces import conversion
+from lfstereo.develop.options import DevelopOptions, Primaries
 from lfstereo.lenslet.grid import LensletGrid
 from lfstereo.lightfield.decoding import calibrate, views_from
 from lfstereo.lightfield.field import LightField

@@ -7,8 +7,11 @@ import math
 import tomllib
 from typing import Any
 
+from lfstereo.develop.colour_spaces import PRIMARIES
+from lfstereo.develop.options import ColourSpace
 from lfstereo.errors import ConfigError, ContainerError
 from lfstereo.lightfield.field import LightField, ViewSampling
+from lfstereo.lightfield.options import PictureOptions
 from lfstereo.options import from_mapping, to_toml, toml_value
 
 FILE_NAME = "light_field.toml"
@@ -23,12 +26,20 @@ class Description:
     """Rows and columns of views."""
     serial: str
     sampling: ViewSampling | None
+    colour_space: ColourSpace
+    """Primaries and curve of the pictures; only the primaries count where values are linear by their format."""
+    exposure_ev: float
+    """By which the pictures are brighter than the light field."""
 
 
-def to_text(light_field: LightField) -> str:
-    """Return the number of views, the camera's serial number and the sampling as TOML."""
+PLAIN = PictureOptions()
+
+
+def to_text(light_field: LightField, pictures: PictureOptions = PLAIN) -> str:
+    """Return the number of views, the camera's serial number, the pictures' colours and the sampling as TOML."""
     rows, columns = light_field.views.shape[:2]
     lines = f"views = [{rows}, {columns}]\nserial = {toml_value(light_field.serial)}\n"
+    lines += f"colour_space = {toml_value(pictures.colour_space)}\nexposure_ev = {toml_value(pictures.exposure_ev)}\n"
     if light_field.sampling is not None:
         lines += "\n[sampling]\n" + to_toml(light_field.sampling)
     return lines
@@ -46,7 +57,8 @@ def from_text(text: str, where: str) -> Description:
         table = tomllib.loads(text)
         sampling = _sampling(table["sampling"], where) if "sampling" in table else None
         rows, columns = (int(n) for n in table["views"])
-        serial = table["serial"]
+        serial, space = table["serial"], table.get("colour_space", PLAIN.colour_space)
+        exposure = float(table.get("exposure_ev", PLAIN.exposure_ev))
     except (tomllib.TOMLDecodeError, ConfigError, KeyError, TypeError, ValueError) as error:
         reason = str(error).splitlines()[0]
         raise ContainerError(f"{where}: not a description of a light field ({reason}); export it again") from error
@@ -55,7 +67,12 @@ def from_text(text: str, where: str) -> Description:
             f"{where}: found serial {serial!r} and {rows} x {columns} views, expected a text and positive numbers; "
             "export it again"
         )
-    return Description((rows, columns), serial, sampling)
+    if space not in PRIMARIES or not abs(exposure) <= 20:
+        raise ContainerError(
+            f"{where}: found colour space {space!r} and exposure {exposure:g} EV, expected one of "
+            f"{', '.join(PRIMARIES)} and at most 20 EV; export it again"
+        )
+    return Description((rows, columns), serial, sampling, space, exposure)
 
 
 def _sampling(table: Any, where: str) -> ViewSampling:

@@ -3,33 +3,39 @@
 from __future__ import annotations
 
 import struct
-import zlib
 from pathlib import Path
 
 import cv2
 import numpy as np
 
 from lfstereo.arrays import UInt8, UInt16
+from lfstereo.develop.colour_spaces import PRIMARIES
 from lfstereo.errors import ContainerError, OutputError
-from lfstereo.lightfield.encoding import srgb16, srgb_to_linear
+from lfstereo.lightfield.encoding import from_picture, to_picture
 from lfstereo.lightfield.field import LightField
-from lfstereo.lightfield.interchange.description import Description, from_text, to_text
+from lfstereo.lightfield.interchange.description import PLAIN, Description, from_text, to_text
+from lfstereo.lightfield.interchange.png_chunks import HEAD_BYTES, chunk, colour_chunk
+from lfstereo.lightfield.options import PictureOptions
 from lfstereo.outputs import atomic_file, check_absent
 from lfstereo.progress import Progress, silent
 
 SUFFIX = ".png"
 _KEYWORD = b"lfstereo"
-_HEAD_BYTES = 33
-"""Signature and IHDR chunk of a PNG."""
 _USUAL_VIEWS = 14
 """Views per direction in the pictures of Lytro's own programs and of the Stanford archive."""
 
 
-def write_eslf(path: Path, light_field: LightField, force: bool = False, progress: Progress = silent) -> None:
-    """Write all views into one 16-bit sRGB picture, the weights as its alpha channel; values above 1 are clipped.
+def write_eslf(
+    path: Path,
+    light_field: LightField,
+    force: bool = False,
+    progress: Progress = silent,
+    pictures: PictureOptions = PLAIN,
+) -> None:
+    """Write all views into one 16-bit picture, the weights as its alpha channel.
 
-    The pixel in row ``v * T + t`` and column ``u * S + s`` belongs to view ``(t, s)``. The number of views and where
-    they lie on the sensor travel in a text chunk.
+    The pixel in row ``v * T + t`` and column ``u * S + s`` belongs to view ``(t, s)``. The colour space is written as
+    other programs read it; the number of views and where they lie on the sensor travel in a text chunk.
 
     Raises
     ------
@@ -47,7 +53,8 @@ def write_eslf(path: Path, light_field: LightField, force: bool = False, progres
     packed = np.empty((height, rows, width, columns, channels), np.uint16)
     for t in range(rows):
         for s in range(columns):
-            packed[:, t, :, s, :3] = srgb16(light_field.views[t, s])[..., ::-1]
+            coded = to_picture(light_field.views[t, s], light_field.colour_space, pictures)
+            packed[:, t, :, s, :3] = np.rint(coded * np.float32(65535))[..., ::-1]
             if light_field.weight is not None:
                 packed[:, t, :, s, 3] = light_field.weight[t, s].astype(np.uint16) * np.uint16(257)
             progress(t * columns + s + 1, rows * columns + 1)
@@ -55,10 +62,10 @@ def write_eslf(path: Path, light_field: LightField, force: bool = False, progres
     done, encoded = cv2.imencode(".png", picture, [cv2.IMWRITE_PNG_COMPRESSION, 1])
     if not done:
         raise OutputError(f"{path}: {width * columns} x {height * rows} px cannot be written as PNG; export views")
-    text = _chunk(b"iTXt", _KEYWORD + bytes(5) + to_text(light_field).encode("utf-8"))
+    text = chunk(b"iTXt", _KEYWORD + bytes(5) + to_text(light_field, pictures).encode("utf-8"))
     with atomic_file(path, force) as scratch, scratch.open("wb") as file:
-        file.write(encoded[:_HEAD_BYTES].tobytes() + text)
-        file.write(encoded[_HEAD_BYTES:].data)
+        file.write(encoded[:HEAD_BYTES].tobytes() + colour_chunk(pictures.colour_space) + text)
+        file.write(encoded[HEAD_BYTES:].data)
     progress(1, 1)
 
 
@@ -87,8 +94,10 @@ def read_eslf(path: Path) -> LightField:
         )
     packed = picture.reshape(height // rows, rows, width // columns, columns, picture.shape[2])
     views = np.empty((rows, columns, height // rows, width // columns, 3), np.float32)
+    space = PLAIN.colour_space if found is None else found.colour_space
+    exposure_ev = 0.0 if found is None else found.exposure_ev
     for t in range(rows):
-        views[t] = srgb_to_linear(packed[:, t, :, :, 2::-1]).transpose(2, 0, 1, 3)
+        views[t] = from_picture(packed[:, t, :, :, 2::-1], space, exposure_ev).transpose(2, 0, 1, 3)
     weight = None
     if picture.shape[2] == 4:
         weight = _eight_bits(packed[..., 3]).transpose(1, 3, 0, 2)
@@ -98,16 +107,13 @@ def read_eslf(path: Path) -> LightField:
         sampling=None if found is None else found.sampling,
         serial="" if found is None else found.serial,
         source=str(path),
+        colour_space=PRIMARIES[space],
     )
 
 
 def _eight_bits(codes: UInt8 | UInt16) -> UInt8:
     wide = codes.dtype == np.uint16
     return ((codes.astype(np.uint32) + 128) // 257 if wide else codes).astype(np.uint8)
-
-
-def _chunk(kind: bytes, content: bytes) -> bytes:
-    return struct.pack(">I", len(content)) + kind + content + struct.pack(">I", zlib.crc32(kind + content))
 
 
 def _description(data: bytes, path: Path) -> Description | None:

@@ -1,40 +1,37 @@
-"""The ICC profile of sRGB, for pictures whose format has no other way to name their colours."""
+"""ICC profiles, by which pictures name their colour space."""
 
 from __future__ import annotations
 
 import struct
+from functools import cache
 
-_WHITE_D50 = (0.9642, 1.0, 0.8249)
-_PRIMARIES = {
-    b"rXYZ": (0.4360747, 0.2225045, 0.0139322),
-    b"gXYZ": (0.3850649, 0.7168786, 0.0971045),
-    b"bXYZ": (0.1430804, 0.0606169, 0.7141733),
-}
-_D65_TO_D50 = (1.0478112, 0.0228866, -0.0501270, 0.0295424, 0.9904844, -0.0170491, -0.0092345, 0.0150436, 0.7521316)
-_CURVE = (2.4, 1 / 1.055, 0.055 / 1.055, 1 / 12.92, 0.04045)
+from lfstereo.develop.colour_spaces import CURVES, NAMES, PRIMARIES, WHITE_D50, d50_from, to_d50
+from lfstereo.develop.options import ColourSpace
 
 
-def srgb_profile() -> bytes:
-    """Return an ICC profile, version 4.3, of sRGB.
+@cache
+def icc_profile(space: ColourSpace) -> bytes:
+    """Return an ICC profile, version 4.3, of a colour space.
 
     References
     ----------
-    ISO 15076-1:2010 (ICC.1:2010), sections 7.2 (header), 10.15 (parametric curve, type 3).
-    IEC 61966-2-1:1999, primaries, white point and curve; adapted to D50 by Bradford's matrix.
+    ISO 15076-1:2010 (ICC.1:2010), sections 7.2 (header), 10.15 (parametric curve, type 3), annex E (adaptation).
 
     Examples
     --------
-    >>> profile = srgb_profile()
+    >>> profile = icc_profile("srgb")
     >>> profile[36:40], int.from_bytes(profile[:4], "big") == len(profile)
     (b'acsp', True)
     """
-    curve = b"para" + struct.pack(">IHH", 0, 3, 0) + _fixed(*_CURVE)
+    matrix = to_d50(PRIMARIES[space])
+    curve = b"para" + struct.pack(">IHH", 0, 3, 0) + _fixed(*CURVES[space])
+    columns = {name: b"XYZ " + bytes(4) + _fixed(*matrix[:, k]) for k, name in enumerate((b"rXYZ", b"gXYZ", b"bXYZ"))}
     tags = {
-        b"desc": _text("sRGB"),
+        b"desc": _text(NAMES[space]),
         b"cprt": _text("Public domain"),
-        b"wtpt": b"XYZ " + bytes(4) + _fixed(*_WHITE_D50),
-        b"chad": b"sf32" + bytes(4) + _fixed(*_D65_TO_D50),
-        **{name: b"XYZ " + bytes(4) + _fixed(*xyz) for name, xyz in _PRIMARIES.items()},
+        b"wtpt": b"XYZ " + bytes(4) + _fixed(*WHITE_D50),
+        b"chad": b"sf32" + bytes(4) + _fixed(*d50_from(PRIMARIES[space]).ravel()),
+        **columns,
         b"rTRC": curve,
         b"gTRC": curve,
         b"bTRC": curve,
@@ -52,7 +49,7 @@ def srgb_profile() -> bytes:
 def _header(size: int) -> bytes:
     made = struct.pack(">6H", 2026, 1, 1, 0, 0, 0)
     head = struct.pack(">I4sI4s4s4s", size, bytes(4), 0x04300000, b"mntr", b"RGB ", b"XYZ ")
-    return (head + made + b"acsp" + bytes(28) + _fixed(*_WHITE_D50)).ljust(128, b"\0")
+    return (head + made + b"acsp" + bytes(28) + _fixed(*WHITE_D50)).ljust(128, b"\0")
 
 
 def _fixed(*values: float) -> bytes:

@@ -11,9 +11,12 @@ import numpy as np
 import numpy.typing as npt
 
 from lfstereo import __version__
+from lfstereo.develop.colour_spaces import PRIMARIES
+from lfstereo.develop.options import Primaries
 from lfstereo.errors import ContainerError
 from lfstereo.lightfield.field import LightField
 from lfstereo.lightfield.interchange.description import from_text, to_text
+from lfstereo.lightfield.options import PictureOptions
 from lfstereo.outputs import atomic_file, check_absent, check_space
 from lfstereo.progress import Progress, silent
 
@@ -63,7 +66,7 @@ def write_decoded_mat(path: Path, light_field: LightField, force: bool = False, 
             _put(file, "GeneratedByInfo", made)
             if light_field.serial:
                 _put(file, "LFMetadata", {"SerialData": {"camera": {"serialNumber": light_field.serial}}})
-            _put(file, _OWN_TEXT, to_text(light_field))
+            _put(file, _OWN_TEXT, to_text(light_field, PictureOptions(colour_space=light_field.colour_space)))
         with scratch.open("r+b") as plain:
             plain.write(_head())
 
@@ -127,11 +130,12 @@ def _read_hdf5(file: Any, path: Path) -> LightField:
         views[..., c] = _share(stored[c].transpose(3, 2, 1, 0))
     weight = _weight(stored[3].transpose(3, 2, 1, 0)) if channels == 4 else None
     serial, sampling = "", None
+    primaries: Primaries = "srgb"
     if _OWN_TEXT in file:
         text = np.asarray(file[_OWN_TEXT][()], np.uint16).tobytes().decode("utf-16-le", "replace")
         found = from_text(text, f"{path}: {_OWN_TEXT}")
-        serial, sampling = found.serial, found.sampling
-    return LightField(_finite(views, path), weight, sampling, serial, str(path))
+        serial, sampling, primaries = found.serial, found.sampling, PRIMARIES[found.colour_space]
+    return LightField(_finite(views, path), weight, sampling, serial, str(path), colour_space=primaries)
 
 
 def _read_older(path: Path) -> LightField:

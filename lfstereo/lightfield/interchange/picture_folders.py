@@ -7,14 +7,16 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
 import tifffile
 
 from lfstereo.arrays import Rgb
 from lfstereo.errors import ContainerError
-from lfstereo.lightfield.encoding import srgb16
+from lfstereo.lightfield.encoding import to_picture
 from lfstereo.lightfield.field import LightField
-from lfstereo.lightfield.interchange.description import FILE_NAME, Description, from_text, to_text
-from lfstereo.lightfield.interchange.icc import srgb_profile
+from lfstereo.lightfield.interchange.description import FILE_NAME, PLAIN, Description, from_text, to_text
+from lfstereo.lightfield.interchange.icc import icc_profile
+from lfstereo.lightfield.options import PictureOptions
 from lfstereo.lightfield.views_folder import read_views_folder, write_png
 from lfstereo.outputs import atomic_folder
 from lfstereo.progress import Progress, silent
@@ -22,21 +24,29 @@ from lfstereo.progress import Progress, silent
 PARAMETERS = "parameters.cfg"
 
 
-def write_tiff_folder(folder: Path, light_field: LightField, force: bool = False, progress: Progress = silent) -> None:
-    """Write each view as ``view_TT_SS.tif``, 16-bit sRGB with its ICC profile; values above 1 are clipped.
+def write_tiff_folder(
+    folder: Path,
+    light_field: LightField,
+    force: bool = False,
+    progress: Progress = silent,
+    pictures: PictureOptions = PLAIN,
+) -> None:
+    """Write each view as ``view_TT_SS.tif``, 16 bits, with the ICC profile of its colour space.
 
     Raises
     ------
     OutputError
         If the folder exists and ``force`` is not set, or it cannot be written.
     """
-    profile = srgb_profile()
+    profile = icc_profile(pictures.colour_space)
 
     def write(path: Path, view: Rgb) -> None:
-        tifffile.imwrite(path, srgb16(view), photometric="rgb", iccprofile=profile, metadata=None, software="lfstereo")
+        coded = to_picture(view, light_field.colour_space, pictures)
+        codes = np.rint(coded * np.float32(65535)).astype(np.uint16)
+        tifffile.imwrite(path, codes, photometric="rgb", iccprofile=profile, metadata=None, software="lfstereo")
 
     with atomic_folder(folder, force) as scratch:
-        _write_views(scratch, "view_{t:02d}_{s:02d}.tif", write, light_field, progress)
+        _write_views(scratch, "view_{t:02d}_{s:02d}.tif", write, light_field, progress, pictures)
 
 
 SENSOR_SIZE_MM = 35.0
@@ -60,6 +70,7 @@ def write_hci_folder(
     light_field: LightField,
     force: bool = False,
     progress: Progress = silent,
+    pictures: PictureOptions = PLAIN,
     lengths: HciLengths | None = None,
 ) -> None:
     """Write the views as the HCI benchmark has them: ``input_Cam000.png`` row by row, and ``parameters.cfg``.
@@ -76,6 +87,8 @@ def write_hci_folder(
         Replace an existing folder.
     progress
         Told of the views written.
+    pictures
+        How linear light becomes pictures; the benchmark's are sRGB.
     lengths
         What turns disparity into depth; left out of ``parameters.cfg`` where it is ``None``, as a light field alone
         does not tell it.
@@ -101,8 +114,12 @@ def write_hci_folder(
         }
     parameters = configparser.ConfigParser(interpolation=None)
     parameters.read_dict({"intrinsics": intrinsics, "extrinsics": extrinsics, "meta": {"scene": folder.name}})
+
+    def write(path: Path, view: Rgb) -> None:
+        write_png(path, view, light_field.colour_space, pictures)
+
     with atomic_folder(folder, force) as scratch:
-        _write_views(scratch, "input_Cam{n:03d}.png", write_png, light_field, progress)
+        _write_views(scratch, "input_Cam{n:03d}.png", write, light_field, progress, pictures)
         with (scratch / PARAMETERS).open("w", encoding="utf-8") as file:
             parameters.write(file)
 
@@ -118,7 +135,7 @@ def read_picture_folder(folder: Path) -> LightField:
         If the views differ in size.
     """
     found = _beside(folder)
-    light_field = read_views_folder(folder, found.views if found is not None else _hci_views(folder))
+    light_field = read_views_folder(folder, found.views if found is not None else _hci_views(folder), found)
     if found is None:
         return light_field
     if light_field.views.shape[:2] != found.views:
@@ -131,14 +148,19 @@ def read_picture_folder(folder: Path) -> LightField:
 
 
 def _write_views(
-    folder: Path, name: str, write: Callable[[Path, Rgb], None], light_field: LightField, progress: Progress
+    folder: Path,
+    name: str,
+    write: Callable[[Path, Rgb], None],
+    light_field: LightField,
+    progress: Progress,
+    pictures: PictureOptions,
 ) -> None:
     rows, columns = light_field.views.shape[:2]
     for t in range(rows):
         for s in range(columns):
             write(folder / name.format(t=t, s=s, n=t * columns + s), light_field.views[t, s])
             progress(t * columns + s + 1, rows * columns)
-    (folder / FILE_NAME).write_text(to_text(light_field), "utf-8")
+    (folder / FILE_NAME).write_text(to_text(light_field, pictures), "utf-8")
 
 
 def _beside(folder: Path) -> Description | None:

@@ -12,11 +12,15 @@ import numpy as np
 import pytest
 import tifffile
 
+from lfstereo.develop.colour_spaces import NAMES, PRIMARIES, conversion, decode_table
+from lfstereo.develop.options import ColourSpace
 from lfstereo.errors import ConfigError, ContainerError, OutputError
 from lfstereo.lightfield import LightField, read_light_field
-from lfstereo.lightfield.encoding import srgb16
-from lfstereo.lightfield.interchange.formats import choose_format, export_light_field
-from lfstereo.lightfield.interchange.icc import srgb_profile
+from lfstereo.lightfield.encoding import srgb8, srgb16, to_picture
+from lfstereo.lightfield.field import in_srgb
+from lfstereo.lightfield.interchange.formats import FormatName, choose_format, export_light_field
+from lfstereo.lightfield.interchange.icc import icc_profile
+from lfstereo.lightfield.options import PictureOptions
 
 CODE_8, CODE_16 = 0.5 / 255 * 2.3, 0.5 / 65535 * 2.3  # linear; the sRGB curve's slope below white is at most 2.3
 
@@ -80,19 +84,105 @@ def test_tiff_carries_a_profile_of_srgb(tmp_path: Path, light_field: LightField)
     with tifffile.TiffFile(tmp_path / "views" / "view_01_02.tif") as file:
         page = file.pages[0]
         assert page.dtype == np.uint16 and page.shape == (6, 8, 3)
-        assert page.tags["InterColorProfile"].value == srgb_profile()
+        assert page.tags["InterColorProfile"].value == icc_profile("srgb")
 
 
-def test_profile_maps_srgb_onto_itself() -> None:
-    """A colour engine turns pictures tagged with the profile into its own sRGB without a change."""
+def test_profiles_are_understood_by_a_colour_engine() -> None:
+    """Pictures tagged with our profiles, turned into sRGB by LittleCMS, against the matrices and curves here."""
     cms = pytest.importorskip("PIL.ImageCms")
     from PIL import Image
 
-    ours, theirs = cms.ImageCmsProfile(io.BytesIO(srgb_profile())), cms.createProfile("sRGB")
-    assert cms.getProfileDescription(ours).strip() == "sRGB"
-    picture = np.random.default_rng(0).integers(0, 256, (16, 16, 3), dtype=np.uint8)
-    turned = np.asarray(cms.profileToProfile(Image.fromarray(picture), ours, theirs))
-    assert np.abs(turned.astype(int) - picture).max() <= 1
+    theirs = cms.createProfile("sRGB")
+    picture = np.random.default_rng(0).integers(60, 190, (16, 16, 3), dtype=np.uint8)
+    for space, name in NAMES.items():
+        ours = cms.ImageCmsProfile(io.BytesIO(icc_profile(space)))
+        assert cms.getProfileDescription(ours).strip() == name
+        turned = np.asarray(cms.profileToProfile(Image.fromarray(picture), ours, theirs, renderingIntent=1))
+        light = decode_table(255, space)[picture] @ conversion(PRIMARIES[space], "srgb").T
+        assert np.abs(turned.astype(int) - srgb8(light.astype(np.float32))).max() <= 2  # codes of 8 bits
+
+
+@pytest.mark.parametrize(
+    ("name", "place", "space"),
+    [
+        ("tiff", "views", "linear"),
+        ("tiff", "views", "display-p3"),
+        ("tiff", "views", "prophoto"),
+        ("eslf", "a.png", "prophoto"),
+        ("png", "views", "display-p3"),
+    ],
+)
+def test_round_trip_in_other_colour_spaces(
+    tmp_path: Path, light_field: LightField, name: FormatName, place: str, space: ColourSpace
+) -> None:
+    pictures = PictureOptions(colour_space=space, exposure_ev=-1.0)
+    export_light_field(tmp_path / place, light_field, name, pictures=pictures)
+    found = read_light_field(tmp_path / place)
+    assert found.colour_space == PRIMARIES[space]
+    inside = (light_field.views >= 0.02).all(-1)  # near black the curve of ProPhoto is at its coarsest
+    step = 2 * (CODE_8 if name == "png" else CODE_16) + 1e-4  # the exposure doubles it; 1e-4 for rounded matrices
+    np.testing.assert_allclose(in_srgb(found).views[inside], light_field.views[inside], atol=2 * step)
+    assert in_srgb(found).views[1, 2, 3, 4, 0] == pytest.approx(1.5, abs=4 * step)  # headroom came along
+
+
+def test_colour_space_is_named_where_other_programs_look(tmp_path: Path, light_field: LightField) -> None:
+    image = pytest.importorskip("PIL.Image")
+    export_light_field(tmp_path / "a", light_field, "png", pictures=PictureOptions("display-p3"))
+    export_light_field(tmp_path / "b.png", light_field, pictures=PictureOptions("prophoto"))
+    export_light_field(tmp_path / "c", light_field)
+    with image.open(tmp_path / "a" / "view_00_00.png") as picture:
+        assert picture.info["icc_profile"] == icc_profile("display-p3")
+    with image.open(tmp_path / "b.png") as picture:
+        assert picture.info["icc_profile"] == icc_profile("prophoto")
+    with image.open(tmp_path / "c" / "view_00_00.png") as picture:
+        assert picture.info["srgb"] == 0 and "icc_profile" not in picture.info
+
+
+def test_wide_light_field_to_srgb_pictures(tmp_path: Path, light_field: LightField) -> None:
+    wide = replace(
+        light_field,
+        views=(light_field.views @ conversion("srgb", "prophoto").T).astype(np.float32),
+        colour_space="prophoto",
+    )
+    export_light_field(tmp_path / "views", wide, "tiff")
+    found = read_light_field(tmp_path / "views")
+    assert found.colour_space == "srgb"
+    np.testing.assert_allclose(found.views, np.clip(light_field.views, 0, 1), atol=CODE_16 + 1e-4)
+    for name in ("a.h5", "a.mat"):
+        export_light_field(tmp_path / name, wide)
+        assert read_light_field(tmp_path / name).colour_space == "prophoto"
+    np.testing.assert_allclose(in_srgb(wide).views, light_field.views, atol=1e-4)
+    assert in_srgb(light_field) is light_field
+
+
+def test_soft_highlights_keep_hue_and_order() -> None:
+    greys = np.repeat(np.linspace(0, 8, 801, dtype=np.float32)[:, None], 3, axis=1)
+    soft = to_picture(greys, "srgb", PictureOptions("linear", "soft"))
+    assert np.ptp(soft, axis=1).max() == 0
+    assert (np.diff(soft[:, 0]) > -1e-6).all() and 0.99 < soft[-1, 0] <= 1
+    np.testing.assert_array_equal(soft[:80], greys[:80])  # below the knee nothing changes
+    assert np.abs(np.diff(soft[75:90, 0], 2)).max() < 1e-3  # and the knee has no corner
+    orange = np.array([[4.0, 2.0, 0.4]], np.float32)
+    bent = to_picture(orange, "srgb", PictureOptions("linear", "soft"))[0]
+    assert bent / bent[0] == pytest.approx(orange[0] / 4)
+    assert to_picture(orange, "srgb", PictureOptions("linear"))[0].tolist() == pytest.approx([1, 1, 0.4])
+
+
+@pytest.mark.parametrize(
+    ("place", "name", "pictures", "match"),
+    [
+        ("a.h5", None, PictureOptions("prophoto"), "format h5: found options of pictures"),
+        ("a.mat", None, PictureOptions(highlights="soft"), "format mat: found options of pictures"),
+        ("a", "png", PictureOptions("linear"), "found the colour space linear, expected srgb or display-p3"),
+        ("a", "hci", PictureOptions("display-p3"), "found the colour space display-p3, expected srgb, as"),
+    ],
+)
+def test_colours_that_a_format_cannot_hold(
+    tmp_path: Path, light_field: LightField, place: str, name: FormatName | None, pictures: PictureOptions, match: str
+) -> None:
+    with pytest.raises(ConfigError, match=match):
+        export_light_field(tmp_path / place, light_field, name, pictures=pictures)
+    assert not (tmp_path / place).exists()
 
 
 @pytest.mark.parametrize(
@@ -119,6 +209,8 @@ def test_pictures_that_are_not_packed(tmp_path: Path, content: bytes, match: str
         ("view_step_px = 0.884", "view_step_px = -1.0", "expected finite numbers and positive steps"),
         ("view_step_px = 0.884", "", "not a description of a light field"),
         ("[sampling]", "[sampling", "not a description of a light field"),
+        ('colour_space = "srgb"', 'colour_space = "cmyk"', "found colour space 'cmyk' and exposure 0 EV"),
+        ("exposure_ev = 0.0", "exposure_ev = nan", "found colour space 'srgb' and exposure nan EV"),
     ],
 )
 def test_damaged_description(tmp_path: Path, light_field: LightField, old: str, new: str, match: str) -> None:
