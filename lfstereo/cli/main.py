@@ -25,6 +25,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "export": ("lfstereo.cli.export", "light field or raw capture to the format of another program"),
     "run": ("lfstereo.cli.run", "two captures to disparity, depth, all-in-focus image and point cloud"),
     "batch": ("lfstereo.cli.batch", "every stereo pair under a folder to depth, on many cores or a cluster"),
+    "view": ("lfstereo.cli.view", "look at results and light fields in the browser, refocus them live"),
     "synthesize": (
         "lfstereo.cli.synthesize",
         "a dual focal stack data set from stereo pictures of known disparity",

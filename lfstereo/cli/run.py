@@ -14,6 +14,7 @@ from lfstereo.progress import StageClock
 from lfstereo.results import Inputs, Report, read_truth, write_results
 from lfstereo.rig.geometry import rectified_geometry
 from lfstereo.rig.rig import read_rig
+from lfstereo.viewer.content import PAGE_NAME
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -60,5 +61,5 @@ def _text(report: Report, output: Path) -> str:
         for name, e in report.errors.items():
             share = "".join(f"{e[f'bad_{n}_percent']:>8.1f}%" for n in (1, 2, 4))
             lines.append(f"  {name:<22}{e['mae_px']:>9.3f}{share}{e['median_depth_error']:>10.2%}")
-    lines.append(f"pictures and data: {output}/ (look first at {output / 'overview.png'})")
+    lines.append(f"pictures and data: {output}/ (look first at {output / PAGE_NAME})")
     return "\n".join(lines)

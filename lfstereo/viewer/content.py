@@ -34,7 +34,7 @@ _DOUBT_LABEL = (
     "How far a second method is away: OpenCV's semi-global matching of the two centre views. Small where both agree, "
     "which is no proof. Darkest where the second method has no answer. A comparison, not a measured uncertainty."
 )
-_ABOUT = {
+KNOWN_FILES = {
     "overview.png": "near and far slice, all-in-focus image, disparity",
     "disparity.pfm": "disparity in px, float32, inf = unknown",
     "disparity.png": "disparity, 16 bit, 256 per px, 0 = unknown",
@@ -143,7 +143,7 @@ def result_content(encoded: EncodedResult, run_toml: str, folder: Path) -> dict[
 
 def list_files(folder: Path) -> list[dict[str, Any]]:
     """Return name, address beside the page, meaning and size of the files in a result folder."""
-    order = list(_ABOUT)
+    order = list(KNOWN_FILES)
     found = sorted(
         (path for path in folder.iterdir() if path.name != PAGE_NAME and not path.name.startswith(".")),
         key=lambda path: (order.index(path.name) if path.name in order else len(order), path.name),
@@ -152,7 +152,7 @@ def list_files(folder: Path) -> list[dict[str, Any]]:
         {
             "name": path.name + ("/" if path.is_dir() else ""),
             "href": path.name + ("/" if path.is_dir() else ""),
-            "about": _ABOUT.get(path.name, ""),
+            "about": KNOWN_FILES.get(path.name, ""),
             "bytes": sum(p.stat().st_size for p in path.rglob("*")) if path.is_dir() else path.stat().st_size,
         }
         for path in found

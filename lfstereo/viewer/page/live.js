@@ -1,6 +1,8 @@
 // Where the page is served by lfstereo view: any focus, aperture and tilt, rendered by the program.
 
 function startLive(served) {
+  if (served.items.length > 1) offerItems(served);
+  if (!served.refocus) return;
   const look = { radius: served.radius_views, tilt_x: 0, tilt_y: 0 };
   let asked = "", running = false, shown = null;
 
@@ -57,15 +59,15 @@ function startLive(served) {
       ];
     },
   };
+}
 
-  if (served.items.length > 1) {
-    const chooser = byId("chooser");
-    chooser.append(...served.items.map((name, k) => element("option", { value: k, textContent: name })));
-    chooser.value = served.item;
-    chooser.parentElement.hidden = false;
-    chooser.addEventListener("change", () => {
-      chooser.disabled = true;
-      location.href = `${served.root}?item=${chooser.value}${location.hash}`;
-    });
-  }
+function offerItems(served) {
+  const chooser = byId("chooser");
+  chooser.append(...served.items.map((name, k) => element("option", { value: k, textContent: name })));
+  chooser.value = served.item;
+  chooser.parentElement.hidden = false;
+  chooser.addEventListener("change", () => {
+    chooser.disabled = true;
+    location.href = `${served.root}?item=${chooser.value}${location.hash}`;
+  });
 }

@@ -76,7 +76,7 @@ const focusMode = {
   share: 0.4,
   pulling: 0,
   live: null,
-  available: SLICES.length > 0 || Boolean(CONTENT.live),
+  available: SLICES.length > 0 || Boolean(CONTENT.live && CONTENT.live.refocus),
   slice() { return clamp(Math.round(this.share * (SLICES.length - 1)), 0, SLICES.length - 1); },
   value() { return this.live || !SLICES.length ? axisValue(this.share) : SLICES[this.slice()].disparity; },
   enter() {

@@ -110,7 +110,7 @@ function settingsSheet() {
 function filesSheet() {
   const head = [{ name: "File" }, { name: "Holds" }, { name: "Size", amount: true }];
   const rows = CONTENT.files.map((file) => ({
-    cells: [element("a", { href: file.href, textContent: file.name }), file.about, file.bytes === null ? "" : sizeText(file.bytes)],
+    cells: [file.href === null ? file.name : element("a", { href: file.href, textContent: file.name }), file.about, file.bytes === null ? "" : sizeText(file.bytes)],
   }));
   return sheet("Files", "Beside this page.", table(head, rows));
 }

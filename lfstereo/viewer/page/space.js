@@ -1,6 +1,6 @@
 // The 3-D mode: orbit about the scene.
 
-const START = { yaw: -0.34, pitch: -0.16, distance: 1.12, panX: 0, panY: 0 };
+const START = { yaw: -0.2, pitch: 0.1, distance: 1.04, panX: 0, panY: 0 };
 
 const spaceMode = {
   id: "space",
@@ -9,7 +9,7 @@ const spaceMode = {
   grab: true,
   ownZoom: true,
   orbit: { ...START },
-  look: { form: "points", size: 1.5, colour: "image" },
+  look: { form: "points", size: 1.8, colour: "image" },
   scene: null,
   renderer: null,
   async enter() {

@@ -19,10 +19,15 @@ void main() {
   result = shade;
 }`;
 
+// Whether a graphics processor does the work: asked of another canvas, since a canvas keeps its first context.
+function webglIsFast() {
+  const gl = offscreen(1, 1).getContext("webgl2", { failIfMajorPerformanceCaveat: true });
+  return Boolean(gl) && !/swiftshader|llvmpipe|software|basic render/i.test(gl.getParameter(gl.RENDERER));
+}
+
 function webglRenderer(canvas, scene, evenIfSlow) {
-  const gl = canvas.getContext("webgl2", {
-    antialias: true, alpha: false, preserveDrawingBuffer: true, failIfMajorPerformanceCaveat: !evenIfSlow,
-  });
+  if (!evenIfSlow && !webglIsFast()) return null;
+  const gl = canvas.getContext("webgl2", { antialias: true, alpha: false, preserveDrawingBuffer: true });
   if (!gl) return null;
   const program = gl.createProgram();
   for (const [kind, source] of [[gl.VERTEX_SHADER, VERTEX_SHADER], [gl.FRAGMENT_SHADER, FRAGMENT_SHADER]]) {

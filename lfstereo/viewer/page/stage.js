@@ -10,6 +10,7 @@ let cursor = null;
 const modeById = (id) => MODES.find((candidate) => candidate.id === id);
 
 stage.style.aspectRatio = `${WIDTH} / ${HEIGHT}`;
+document.documentElement.style.setProperty("--aspect", WIDTH / HEIGHT);
 
 // Image px (pixel corners at integers) to CSS px of the stage and back.
 function view() {
