@@ -76,8 +76,8 @@ def find_focus_range(
     slopes = found.slope[found.certain]
     if len(slopes) < _LEAST_PIXELS:
         raise QualityError(
-            f"{light_field.source}: found {len(slopes)} pixels with a sure slope, expected {_LEAST_PIXELS} or more; give "
-            "the near and the far limit"
+            f"{light_field.source}: found {len(slopes)} pixels with a sure slope, expected {_LEAST_PIXELS} or more; "
+            "give the near and the far limit"
         )
     far, near = np.quantile(slopes, [options.share, 1 - options.share])
     return FocusRange(near=float(near), far=float(far), certain_share=float(found.certain.mean()))
@@ -182,9 +182,8 @@ def _improved(
         towards += residual * change
         texture += change * change
         misfit += residual * residual
-    towards, texture, misfit = (
-        cv2.GaussianBlur(part, (0, 0), options.window_px) for part in (towards, texture, misfit)
-    )
+    sigma = options.window_px
+    towards, texture, misfit = (cv2.GaussianBlur(part, (0, 0), sigma) for part in (towards, texture, misfit))
     step = towards / (texture + _TINY)
     limit = 1.0 / max(max(map(abs, away)) for away in views)
     left = np.maximum(misfit - step * towards, 0) / len(views)

@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 
 from lfstereo.arrays import Float32, Rgb, UInt8
+from lfstereo.errors import ConfigError
 from lfstereo.lightfield.encoding import srgb8
 from lfstereo.lightfield.field import LightField
 
@@ -13,19 +14,42 @@ _GAP = 4
 _EPI_ZOOM = 4
 
 
-def horizontal_epi(light_field: LightField, row: int) -> Rgb:
-    """Return the epipolar-plane image of one image row through the centre row of views.
+def horizontal_epi(light_field: LightField, row: int, view_row: int | None = None) -> Rgb:
+    """Return the epipolar-plane image of one image row through a row of views, by default the centre one.
 
     Returns
     -------
     ``(S, U, 3)``: a point of slope sigma draws a line that moves by ``-sigma`` px per row downwards.
+
+    Raises
+    ------
+    ConfigError
+        If the light field has no such row.
     """
-    return np.ascontiguousarray(light_field.views[light_field.centre[0], :, row])
+    t = light_field.centre[0] if view_row is None else view_row
+    _check_inside(light_field, "row", row, 2)
+    _check_inside(light_field, "row of views", t, 0)
+    return np.ascontiguousarray(light_field.views[t, :, row])
 
 
-def vertical_epi(light_field: LightField, column: int) -> Rgb:
-    """Return the epipolar-plane image of one image column through the centre column of views, ``(T, V, 3)``."""
-    return np.ascontiguousarray(light_field.views[:, light_field.centre[1], :, column])
+def vertical_epi(light_field: LightField, column: int, view_column: int | None = None) -> Rgb:
+    """Return the epipolar-plane image of one image column through a column of views, ``(T, V, 3)``.
+
+    Raises
+    ------
+    ConfigError
+        If the light field has no such column.
+    """
+    s = light_field.centre[1] if view_column is None else view_column
+    _check_inside(light_field, "column", column, 3)
+    _check_inside(light_field, "column of views", s, 1)
+    return np.ascontiguousarray(light_field.views[:, s, :, column])
+
+
+def _check_inside(light_field: LightField, name: str, index: int, axis: int) -> None:
+    count = light_field.views.shape[axis]
+    if not 0 <= index < count:
+        raise ConfigError(f"{light_field.source}: found {name} {index}, expected 0 to {count - 1}")
 
 
 def display_gain(light_field: LightField) -> float:
