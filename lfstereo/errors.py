@@ -58,6 +58,10 @@ class TargetNotFoundError(QualityError):
     """No calibration target was found in an image that should show one."""
 
 
+class AlignmentError(QualityError):
+    """The pictures of one sweep could not be brought to coincide."""
+
+
 class RigError(QualityError):
     """A rig's geometry does not allow what was asked of it."""
 
@@ -66,3 +70,7 @@ class MissingExtraError(LfstereoError, ImportError):
     """An optional package that the called feature needs is not installed."""
 
     exit_code: ClassVar[int] = 3
+
+
+class QualityWarning(UserWarning):
+    """A result was computed with less than it should have been, and says how good it is."""
