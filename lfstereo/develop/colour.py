@@ -93,6 +93,6 @@ def camera_matrix(metadata: FrameMetadata, temperature_k: float | None = None) -
     return scaled
 
 
-def to_linear(rgb: Rgb, matrix: Float64, exposure_ev: float = 0.0) -> Rgb:
-    """Turn white-balanced camera colours into linear RGB by a matrix, in place, ``2^exposure_ev`` brighter."""
-    return np.asarray(cv2.transform(rgb, matrix * 2.0**exposure_ev, dst=rgb), np.float32)
+def to_linear(rgb: Rgb, matrix: Float64) -> Rgb:
+    """Turn white-balanced camera colours into linear RGB by a matrix, in place."""
+    return np.asarray(cv2.transform(rgb, matrix, dst=rgb), np.float32)

@@ -69,7 +69,12 @@ def bilinear(mosaic: Float32, bayer: str) -> Rgb:
     return _by_filters(mosaic, bayer, cross, row, row.T, corners)
 
 
-DEMOSAIC: dict[DemosaicMethod, Callable[[Float32, str], Rgb]] = {"malvar2004": malvar2004, "bilinear": bilinear}
+DEMOSAIC: dict[DemosaicMethod, Callable[[Float32, str], Rgb]] = {
+    # Views are read from the micro-images' own samples; a picture of the whole mosaic is Malvar's.
+    "micro-images": malvar2004,
+    "malvar2004": malvar2004,
+    "bilinear": bilinear,
+}
 
 
 def _by_filters(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from lfstereo.arrays import Float32, Rgb, UInt16
+from lfstereo.arrays import Float32, Float64, Rgb, UInt16
 from lfstereo.container.capture import Capture
 from lfstereo.container.metadata import FrameMetadata
 from lfstereo.develop.colour import camera_matrix, grey_world_gains, to_linear, white_balance
@@ -24,18 +24,12 @@ def develop(
     options: DevelopOptions = DevelopOptions(),
     hot_pixels: UInt16 | None = None,
 ) -> Rgb:
-    """Develop a raw mosaic: levels, devignetting, hot pixels, white balance, highlights, demosaic, colour.
+    """Develop a raw mosaic to a picture: :func:`develop_mosaic`, demosaic, :func:`output_matrix`.
 
     Parameters
     ----------
-    capture
-        The photograph.
-    shading
-        ``(H, W)`` float32 relative illumination of its pixels, 1 = full light.
-    options
-        Methods and limits.
-    hot_pixels
-        ``(N, 2)`` (x, y) pixels that are known to be bad, as the camera's ``HOTPIXEL.BIN`` lists them.
+    capture, shading, options, hot_pixels
+        As for :func:`develop_mosaic`.
 
     Returns
     -------
@@ -51,11 +45,40 @@ def develop(
     MetadataError
         If the colour matrix cannot be used, or there are none for a colour temperature.
     """
-    if not options.colour_matrix and options.colour_space != "srgb":
-        raise ConfigError(
-            f"colour_space: found {options.colour_space} without the colour matrix, expected one with the other; leave "
-            "the camera's own colours as they are, or apply the matrix"
-        )
+    matrix = output_matrix(capture.metadata, options)
+    mosaic = develop_mosaic(capture, shading, options, hot_pixels)
+    return to_linear(DEMOSAIC[options.demosaic](mosaic, capture.metadata.bayer), matrix)
+
+
+def develop_mosaic(
+    capture: Capture,
+    shading: Float32,
+    options: DevelopOptions = DevelopOptions(),
+    hot_pixels: UInt16 | None = None,
+) -> Float32:
+    """Develop a raw mosaic up to the demosaic: levels, devignetting, hot pixels, white balance, highlights.
+
+    Parameters
+    ----------
+    capture
+        The photograph.
+    shading
+        ``(H, W)`` float32 relative illumination of its pixels, 1 = full light.
+    options
+        Methods and limits.
+    hot_pixels
+        ``(N, 2)`` (x, y) pixels that are known to be bad, as the camera's ``HOTPIXEL.BIN`` lists them.
+
+    Returns
+    -------
+    ``(H, W)`` float32, still one colour per pixel, greys equal in all colours; 1 = the level at which green clips in
+    full light.
+
+    Raises
+    ------
+    AssetError
+        If the shading has another size.
+    """
     meta = capture.metadata
     mosaic = devignette(normalise_levels(capture), shading, options.shading_floor)
     if options.hot_pixels:
@@ -64,11 +87,29 @@ def develop(
     gains = grey_world_gains(mosaic, meta.bayer) if grey_world else meta.white_balance
     white_balance(mosaic, gains, meta.bayer)
     lift_clipped(mosaic, capture.mosaic, meta, gains)
-    rgb = DEMOSAIC[options.demosaic](mosaic, meta.bayer)
+    return mosaic
+
+
+def output_matrix(metadata: FrameMetadata, options: DevelopOptions = DevelopOptions()) -> Float64:
+    """Return ``(3, 3)``: white-balanced camera RGB to linear RGB of the options' colour space, with the exposure bias.
+
+    Raises
+    ------
+    ConfigError
+        If the colour temperature cannot be, or a colour space is asked for without the colour matrix.
+    MetadataError
+        If the colour matrix cannot be used, or there are none for a colour temperature.
+    """
     if not options.colour_matrix:
-        return rgb
-    matrix = conversion("srgb", options.colour_space) @ camera_matrix(meta, options.temperature_k)
-    return to_linear(rgb, matrix, meta.exposure_bias_ev if options.exposure_bias else 0.0)
+        if options.colour_space != "srgb":
+            raise ConfigError(
+                f"colour_space: found {options.colour_space} without the colour matrix, expected one with the other; "
+                "leave the camera's own colours as they are, or apply the matrix"
+            )
+        return np.eye(3)
+    matrix = conversion("srgb", options.colour_space) @ camera_matrix(metadata, options.temperature_k)
+    exposed: Float64 = matrix * 2.0 ** (metadata.exposure_bias_ev if options.exposure_bias else 0.0)
+    return exposed
 
 
 def normalise_levels(capture: Capture) -> Float32:

@@ -11,14 +11,16 @@ Primaries = Literal["srgb", "display-p3", "prophoto"]
 """What the three numbers of linear light stand for."""
 ColourSpace = Literal["srgb", "linear", "display-p3", "prophoto"]
 """Primaries and transfer curve of a picture; ``linear`` has those of sRGB and no curve."""
-DemosaicMethod = Literal["malvar2004", "bilinear"]
+DemosaicMethod = Literal["micro-images", "malvar2004", "bilinear"]
 
 
 @dataclass(frozen=True, slots=True)
 class DevelopOptions:
     """How a raw mosaic becomes linear RGB."""
 
-    demosaic: DemosaicMethod = option("malvar2004", "how missing colours are interpolated")
+    demosaic: DemosaicMethod = option(
+        "micro-images", "how missing colours are found: per micro-image, straight to the views, or on the whole mosaic"
+    )
     white_balance: Literal["camera", "grey-world"] = option("camera", "gains that the camera wrote, or a grey mean")
     shading_floor: float = option(0.05, "least relative illumination that devignetting divides by")
     hot_pixels: bool = option(True, "repair pixels that their neighbours of the same colour contradict")

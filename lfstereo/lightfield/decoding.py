@@ -6,7 +6,7 @@ import numpy as np
 
 from lfstereo.arrays import Float32
 from lfstereo.container.capture import Capture
-from lfstereo.develop.develop import develop
+from lfstereo.develop.develop import develop, develop_mosaic, output_matrix
 from lfstereo.develop.shading import shading_from_photograph, shading_from_white_image
 from lfstereo.errors import AssetError, ConfigError
 from lfstereo.lenslet.fit import estimate_grid_from_photograph, fit_grid
@@ -14,8 +14,9 @@ from lfstereo.lenslet.grid import LensletGrid
 from lfstereo.lenslet.options import GridOptions
 from lfstereo.lightfield.field import LightField
 from lfstereo.lightfield.lftoolbox import decode_as_lftoolbox
+from lfstereo.lightfield.micro_images import read_micro_images
 from lfstereo.lightfield.options import DecodeOptions, ViewOptions
-from lfstereo.lightfield.resample import sample_views, view_sampling
+from lfstereo.lightfield.resample import LensletImage, LensletReader, offsets_inside, sample_views, view_sampling
 from lfstereo.progress import Progress, silent
 
 _RIM_PX = 0.8
@@ -113,9 +114,16 @@ def views_from(
     """
     count = view_count(grid, options.view)
     sampling = view_sampling(grid, options.view.view_step_px)
-    image = develop(capture, shading, options.develop)
+    offsets = offsets_inside(grid, sampling, count)
+    read: LensletReader
+    if options.develop.demosaic == "micro-images":
+        matrix = output_matrix(capture.metadata, options.develop)
+        mosaic = develop_mosaic(capture, shading, options.develop)
+        read = read_micro_images(mosaic, shading, grid, offsets, capture.metadata.bayer, matrix)
+    else:
+        read = LensletImage(develop(capture, shading, options.develop), grid.centres(), offsets)
     progress(30, 100)
-    views, weight = sample_views(image, shading, grid, sampling, count, _part(progress, 30, 100))
+    views, weight = sample_views(read, shading, grid, sampling, count, _part(progress, 30, 100))
     return LightField(
         views=views,
         weight=weight,

@@ -47,7 +47,7 @@ def hexagon_weights() -> Float32:
     own = [(float(k), 0.0) for k in range(-REACH_OWN, REACH_OWN + 1)]
     beside = [(k + 0.5, row) for row in (-1.0, 1.0) for k in range(-REACH_NEXT, REACH_NEXT)]
     places = np.array(own + beside) * (_PITCH, 1.0)
-    covariance = _covariance()
+    covariance = lenslet_covariance()
     count = len(places)
     drift = _drift(places)
     between = np.hypot(*(places[:, None] - places[None]).transpose(2, 0, 1))
@@ -69,8 +69,9 @@ def _drift(places: Float64) -> Float64:
     return np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=1)
 
 
-def _covariance() -> tuple[Float64, Float64]:
-    """Return distances, and the covariance of lenslet brightnesses at each, 1 at distance 0."""
+@functools.cache
+def lenslet_covariance() -> tuple[Float64, Float64]:
+    """Return distances in rows of lenslets, and the covariance of lenslet brightnesses at each, 1 at distance 0."""
     size, step = 512, 0.25
     frequency = np.fft.fftfreq(size, step)
     radial = np.hypot(*np.meshgrid(frequency, frequency))

@@ -1,22 +1,27 @@
-"""Resample a developed lenslet image to views: inside each micro-image, then from hexagons to squares."""
+"""Resample to views: inside each micro-image where all colours are known, then from hexagons to squares."""
 
 from __future__ import annotations
 
 import os
 from concurrent.futures import ThreadPoolExecutor
-from typing import TypeAlias
+from dataclasses import dataclass
+from typing import Protocol, TypeAlias
 
 import numba
 import numpy as np
 import numpy.typing as npt
+from threadpoolctl import threadpool_limits
 
 from lfstereo.arrays import Float32, Float64, Rgb, UInt8, Views
 from lfstereo.lenslet.grid import LensletGrid
 from lfstereo.lightfield.field import ViewSampling
 from lfstereo.lightfield.hexagons import hexagon_weights
+from lfstereo.lightfield.micro_images import Index
 from lfstereo.progress import Progress, silent
 
-_ROWS_PER_TASK = 24
+_ROWS_PER_BAND = 18
+_COLUMNS_AT_ONCE = 16
+"""View columns of all views that are computed before they are written, so that they stay in the processor's cache."""
 IntArray: TypeAlias = npt.NDArray[np.int64]
 
 
@@ -59,25 +64,53 @@ def view_offsets(sampling: ViewSampling, count: int) -> Float64:
     return np.stack([cos * s - sin * t, sin * s + cos * t], axis=2)
 
 
+class LensletReader(Protocol):
+    """Gives the views' colours at the lenslets of some rows, on the hexagonal lattice."""
+
+    def __call__(self, start: int, stop: int) -> tuple[Float32, Index]:
+        """Return ``(lenslets, 3 N)`` values and the ``(rows, columns)`` places of the lenslets among them."""
+
+
+@dataclass(frozen=True, slots=True)
+class LensletImage:
+    """An image with all colours on the raw sensor's pixels, read by cubic convolution at the exact positions.
+
+    References
+    ----------
+    Keys, "Cubic convolution interpolation for digital image processing" (IEEE TASSP 1981), eq. 15 (a = -1/2).
+    """
+
+    image: Rgb
+    """``(H, W, 3)``; beyond the sensor its last pixel counts."""
+    centres: Float64
+    """``(rows, columns, 2)`` (x, y) px of the lenslets."""
+    offsets: Float64
+    """``(N, 2)`` (x, y) px of the views from a micro-image's centre."""
+
+    def __call__(self, start: int, stop: int) -> tuple[Float32, Index]:
+        """Return the views' colours at the lenslets of some rows, as :class:`LensletReader` says."""
+        centres = self.centres[start:stop].reshape(-1, 2)
+        values: Float32 = np.empty((len(centres), 3 * len(self.offsets)), np.float32)
+        _sample_lenslets(self.image, centres, self.offsets, values.reshape(len(centres), -1, 3))
+        return values, np.arange(len(centres), dtype=np.int32).reshape(stop - start, -1)
+
+
 def sample_views(
-    image: Rgb,
+    read: LensletReader,
     shading: Float32,
     grid: LensletGrid,
     sampling: ViewSampling,
     count: int,
     progress: Progress = silent,
 ) -> tuple[Views, UInt8]:
-    """Read all views and the weights of their samples from an image on the raw sensor's pixels.
-
-    Inside a micro-image by cubic convolution at the exact sub-pixel position; then from the hexagonal lattice of
-    lenslets to the square columns by the weights of :func:`hexagon_weights`, and nothing in between.
+    """Turn the hexagonal lattice of lenslets into views of square pixels, by the weights of :func:`hexagon_weights`.
 
     Parameters
     ----------
-    image
-        ``(H, W, 3)`` linear RGB.
+    read
+        Gives the colours at the lenslets of the views that :func:`offsets_inside` names, in that order.
     shading
-        ``(H, W)`` float32 relative illumination of the same pixels, 1 = full light.
+        ``(H, W)`` float32 relative illumination of the sensor's pixels, 1 = full light.
     grid
         The lenslet grid.
     sampling
@@ -85,51 +118,38 @@ def sample_views(
     count
         Views per direction, odd.
     progress
-        Told of each batch of rows.
+        Told of each band of rows.
 
     Returns
     -------
     Views ``(T, S, V, U, 3)`` float32, not below 0, and weights ``(T, S, V, U)`` uint8, 255 = full light. Views
-    that would look through a neighbouring lenslet are 0 in both; beyond the sensor the last pixel counts, with
-    weight 0.
-
-    References
-    ----------
-    Keys, "Cubic convolution interpolation for digital image processing" (IEEE TASSP 1981), eq. 15 (a = -1/2).
+    that would look through a neighbouring lenslet are 0 in both; off the sensor the weight is 0.
     """
     columns = view_columns(grid)
     views = np.zeros((count, count, grid.rows, columns, 3), np.float32)
     weights = np.zeros((count, count, grid.rows, columns), np.uint8)
-    inside = views_inside(grid, sampling, count).ravel()
-    offsets = np.ascontiguousarray(view_offsets(sampling, count).reshape(-1, 2)[inside])
-    numbers = np.flatnonzero(inside)
+    offsets = offsets_inside(grid, sampling, count)
+    numbers = np.flatnonzero(views_inside(grid, sampling, count))
     centres = grid.centres()
     first, step = _column_positions(grid, sampling)
     table = hexagon_weights()
     flat_views = views.reshape(count * count, grid.rows, columns, 3)
     flat_weights = weights.reshape(count * count, grid.rows, columns)
-    starts = list(range(0, grid.rows, _ROWS_PER_TASK))
+    starts = range(0, grid.rows, _ROWS_PER_BAND)
 
     def task(start: int) -> None:
-        stop = min(start + _ROWS_PER_TASK, grid.rows)
-        shifted = grid.first_shifted_row
-        _sample_rows(
-            image,
-            shading,
-            centres,
-            offsets,
-            numbers,
-            first,
-            step,
-            shifted,
-            table,
-            start,
-            stop,
-            flat_views,
-            flat_weights,
-        )
+        stop = min(start + _ROWS_PER_BAND, grid.rows)
+        halo = max(start - 1, 0), min(stop + 1, grid.rows)
+        values, places = read(*halo)
+        for row in range(start, stop):
+            shifted = (row + grid.first_shifted_row) % 2 == 0
+            # The lattice is symmetric about a row, so beyond the first and last row the other neighbour serves.
+            around = [row, row - 1 if row > 0 else row + 1, row + 1 if row + 1 < grid.rows else row - 1]
+            near = places[np.clip(np.array(around) - halo[0], 0, len(places) - 1)]
+            _blend_row(values, near, numbers, first[row], step, shifted, table, row, flat_views)
+            _weigh_row(shading, centres[row], offsets, numbers, first[row], step, row, flat_weights)
 
-    with ThreadPoolExecutor(max_workers=os.cpu_count() or 1) as pool:
+    with threadpool_limits(1, user_api="blas"), ThreadPoolExecutor(max_workers=os.cpu_count() or 1) as pool:
         for done, _ in enumerate(pool.map(task, starts)):
             progress(done + 1, len(starts))
     return views, weights
@@ -142,6 +162,12 @@ def views_inside(
     offsets = view_offsets(sampling, count)
     radius = 0.5 * float(np.hypot(*grid.step_u_px))
     return np.asarray(np.hypot(offsets[..., 0], offsets[..., 1]) <= radius, np.bool_)
+
+
+def offsets_inside(grid: LensletGrid, sampling: ViewSampling, count: int) -> Float64:
+    """Return ``(N, 2)`` offsets (x, y) px from a micro-image's centre of the views that stay inside it."""
+    offsets = view_offsets(sampling, count)[views_inside(grid, sampling, count)]
+    return np.asarray(offsets, np.float64)
 
 
 def _column_positions(grid: LensletGrid, sampling: ViewSampling) -> tuple[Float64, float]:
@@ -166,17 +192,15 @@ def _keys(f: float) -> tuple[float, float, float, float]:  # pragma: no cover
 
 
 @numba.njit(cache=True, nogil=True, fastmath=True)  # type: ignore[untyped-decorator]
-def _sample_lenslets(
-    image: Float32, shading: Float32, centres: Float64, offsets: Float64, out: Float32
-) -> None:  # pragma: no cover
-    """Fill ``out`` ``(views, lenslets, 4)``: RGB and shading of one row of lenslets."""
-    height, width = shading.shape
+def _sample_lenslets(image: Float32, centres: Float64, offsets: Float64, out: Float32) -> None:  # pragma: no cover
+    """Fill ``out`` ``(lenslets, views, 3)`` for one row of lenslets."""
+    height, width = image.shape[:2]
     for k in range(centres.shape[0]):
         for n in range(offsets.shape[0]):
             x, y = centres[k, 0] + offsets[n, 0], centres[k, 1] + offsets[n, 1]
             left, top = int(np.floor(x)), int(np.floor(y))
             wx, wy = _keys(x - left), _keys(y - top)
-            red = green = blue = light = np.float32(0.0)
+            red = green = blue = np.float32(0.0)
             for b in range(4):
                 row = min(max(top - 1 + b, 0), height - 1)
                 for a in range(4):
@@ -185,68 +209,86 @@ def _sample_lenslets(
                     red += weight * image[row, column, 0]
                     green += weight * image[row, column, 1]
                     blue += weight * image[row, column, 2]
-                    light += weight * shading[row, column]
-            out[n, k, 0], out[n, k, 1], out[n, k, 2] = red, green, blue
-            on_sensor = x >= 0.0 and y >= 0.0 and x <= width - 1.0 and y <= height - 1.0
-            out[n, k, 3] = light if on_sensor else np.float32(0.0)
+            out[k, n, 0], out[k, n, 1], out[k, n, 2] = red, green, blue
 
 
 @numba.njit(cache=True, nogil=True, fastmath=True)  # type: ignore[untyped-decorator]
-def _sample_rows(
-    image: Float32,
-    shading: Float32,
-    centres: Float64,
-    offsets: Float64,
+def _blend_row(
+    values: Float32,
+    places: Index,
     numbers: IntArray,
-    first: Float64,
+    first: float,
     step: float,
-    first_shifted_row: int,
+    shifted: bool,
     table: Float32,
-    start: int,
-    stop: int,
+    v: int,
     views: Float32,
-    weights: UInt8,
 ) -> None:  # pragma: no cover
-    """Fill rows ``start`` to ``stop`` of the views, keeping three rows of lenslets at a time."""
-    rows, lenslets = centres.shape[0], centres.shape[1]
-    blend = np.empty(13, np.float32)
-    ring = np.zeros((3, offsets.shape[0], lenslets, 4), np.float32)
-    for v in range(max(start - 1, 0), min(start + 1, rows)):
-        _sample_lenslets(image, shading, centres[v], offsets, ring[v % 3])
-    for v in range(start, stop):
-        if v + 1 < rows:
-            _sample_lenslets(image, shading, centres[v + 1], offsets, ring[(v + 1) % 3])
-        # The lattice is symmetric about a row, so beyond the first and last row the other neighbour serves.
-        above = v - 1 if v > 0 else min(1, rows - 1)
-        below = v + 1 if v + 1 < rows else max(rows - 2, 0)
-        shifted = (v + first_shifted_row) % 2 == 0
-        half = 1 if shifted else 0
-        for u in range(views.shape[2]):
-            position = min(max(first[v] + u * step, 0.0), lenslets - 1.0)
+    """Fill row ``v`` of the views, a few columns of all views at a time.
+
+    ``places`` ``(3, columns)`` says where the lenslets of the row, the one above and the one below stand.
+    """
+    lenslets, half = places.shape[1], 1 if shifted else 0
+    columns, size = views.shape[2], values.shape[1]
+    block = np.empty((_COLUMNS_AT_ONCE, size), np.float32)
+    zero = np.float32(0.0)
+    for start in range(0, columns, _COLUMNS_AT_ONCE):
+        stop = min(start + _COLUMNS_AT_ONCE, columns)
+        for u in range(start, stop):
+            blended = block[u - start]
+            blended[:] = zero
+            position = min(max(first + u * step, 0.0), lenslets - 1.0)
             nearest = int(np.floor(position + 0.5))
             phase = (position - nearest + 0.5) * (table.shape[0] - 1)
             lower = min(int(phase), table.shape[0] - 2)
             for tap in range(13):
-                blend[tap] = table[lower, tap] + np.float32(phase - lower) * (table[lower + 1, tap] - table[lower, tap])
-            for n in range(offsets.shape[0]):
-                red = green = blue = light = np.float32(0.0)
-                for tap in range(13):
-                    if tap < 5:
-                        source, k = v, nearest + tap - 2
-                    elif tap < 9:
-                        source, k = above, nearest + tap - 7 + half
-                    else:
-                        source, k = below, nearest + tap - 11 + half
-                    k = min(max(k, 0), lenslets - 1)
-                    weight = blend[tap]
-                    red += weight * ring[source % 3, n, k, 0]
-                    green += weight * ring[source % 3, n, k, 1]
-                    blue += weight * ring[source % 3, n, k, 2]
-                    light += weight * ring[source % 3, n, k, 3]
-                zero = np.float32(0.0)
-                views[numbers[n], v, u, 0] = max(red, zero)
-                views[numbers[n], v, u, 1] = max(green, zero)
-                views[numbers[n], v, u, 2] = max(blue, zero)
-                weights[numbers[n], v, u] = int(
-                    min(max(light, zero), np.float32(1.0)) * np.float32(255) + np.float32(0.5)
-                )
+                if tap < 5:
+                    row, k = 0, nearest + tap - 2
+                elif tap < 9:
+                    row, k = 1, nearest + tap - 7 + half
+                else:
+                    row, k = 2, nearest + tap - 11 + half
+                weight = table[lower, tap] + np.float32(phase - lower) * (table[lower + 1, tap] - table[lower, tap])
+                source = values[places[row, min(max(k, 0), lenslets - 1)]]
+                for m in range(size):
+                    blended[m] += weight * source[m]
+        for n in range(numbers.shape[0]):
+            target = views[numbers[n], v]
+            for u in range(start, stop):
+                target[u, 0] = max(block[u - start, 3 * n], zero)
+                target[u, 1] = max(block[u - start, 3 * n + 1], zero)
+                target[u, 2] = max(block[u - start, 3 * n + 2], zero)
+
+
+@numba.njit(cache=True, nogil=True, fastmath=True)  # type: ignore[untyped-decorator]
+def _weigh_row(
+    shading: Float32,
+    centres: Float64,
+    offsets: Float64,
+    numbers: IntArray,
+    first: float,
+    step: float,
+    v: int,
+    weights: UInt8,
+) -> None:  # pragma: no cover
+    """Fill row ``v`` of the weights: illumination, linear in the micro-image and between lenslets of the row."""
+    height, width = shading.shape
+    lenslets = centres.shape[0]
+    light = np.empty(lenslets, np.float32)
+    for n in range(offsets.shape[0]):
+        for k in range(lenslets):
+            x, y = centres[k, 0] + offsets[n, 0], centres[k, 1] + offsets[n, 1]
+            light[k] = np.float32(0.0)
+            if x >= 0.0 and y >= 0.0 and x <= width - 1.0 and y <= height - 1.0:
+                left, top = min(int(x), width - 2), min(int(y), height - 2)
+                fx, fy = np.float32(x - left), np.float32(y - top)
+                upper = shading[top, left] + fx * (shading[top, left + 1] - shading[top, left])
+                lower = shading[top + 1, left] + fx * (shading[top + 1, left + 1] - shading[top + 1, left])
+                light[k] = min(max(upper + fy * (lower - upper), np.float32(0.0)), np.float32(1.0))
+        target = weights[numbers[n], v]
+        for u in range(target.shape[0]):
+            position = min(max(first + u * step, 0.0), lenslets - 1.0)
+            k = min(int(position), max(lenslets - 2, 0))
+            share = np.float32(position - k)
+            between = light[k] + share * (light[min(k + 1, lenslets - 1)] - light[k])
+            target[u] = int(between * np.float32(255) + np.float32(0.5))

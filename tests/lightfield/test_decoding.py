@@ -20,7 +20,7 @@ from lfstereo.lightfield import DecodeOptions, LightField, decode
 from lfstereo.lightfield.decoding import view_count
 from lfstereo.lightfield.hexagons import PHASES, hexagon_weights
 from lfstereo.lightfield.options import ViewOptions
-from lfstereo.lightfield.resample import sample_views, view_columns, view_sampling
+from lfstereo.lightfield.resample import LensletImage, offsets_inside, sample_views, view_columns, view_sampling
 
 PARALLAX = 3.5
 """Px on the lattice per px inside the micro-image: slope 3.5 * 0.884 / 12.38 = 0.25 view px per view."""
@@ -168,7 +168,8 @@ def test_sampling_tells_where_a_view_pixel_lies(shifted: int, rotation: float) -
     y, x = np.mgrid[:300, :400].astype(np.float32)
     image = np.stack([x, y, np.ones_like(x)], axis=2)
     sampling = view_sampling(grid, 0.884)
-    views, weight = sample_views(image, np.ones((300, 400), np.float32), grid, sampling, 3)
+    read = LensletImage(image, grid.centres(), offsets_inside(grid, sampling, 3))
+    views, weight = sample_views(read, np.ones((300, 400), np.float32), grid, sampling, 3)
     light_field = LightField(views, weight, sampling, "", "test")
     true_x, true_y = view_positions(light_field)
     inner = (slice(2, -2), slice(3, -3))
@@ -183,8 +184,9 @@ def test_sampling_tells_where_a_view_pixel_lies(shifted: int, rotation: float) -
 
 def test_weight_is_zero_off_the_sensor() -> None:
     grid = replace(grid_of(14.3), origin_px=(-10.0, -5.0))
-    shading = np.ones((300, 400), np.float32)
-    _, weight = sample_views(np.ones((300, 400, 3), np.float32), shading, grid, view_sampling(grid, 0.884), 1)
+    sampling = view_sampling(grid, 0.884)
+    read = LensletImage(np.ones((300, 400, 3), np.float32), grid.centres(), offsets_inside(grid, sampling, 1))
+    _, weight = sample_views(read, np.ones((300, 400), np.float32), grid, sampling, 1)
     assert weight[0, 0, 0].max() < 30
     assert weight[0, 0, 5:15, 5:15].min() == 255
 
