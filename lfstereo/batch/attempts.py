@@ -75,8 +75,9 @@ def verdict_on_loss(job: Job, lost: Note) -> Outcome | None:
         reason = f"stopped after {job.time_limit_s:g} s in stage '{lost.stage}'; raise --time-limit-s if it needs more"
         return Outcome(job.name, "failed", reason, TIME_LIMIT, attempt=lost.attempt, workers=(lost.worker,))
     if lost.attempt > job.retries:
+        times = "once" if lost.attempt == 1 else f"{lost.attempt} times"
         reason = (
-            f"its worker was lost {lost.attempt} times, last in stage '{lost.stage}' on {lost.worker}: killed, or out "
+            f"its worker was lost {times}, last in stage '{lost.stage}' on {lost.worker}: killed, or out "
             "of memory; use fewer --workers"
         )
         return Outcome(job.name, "failed", reason, "worker lost", attempt=lost.attempt, workers=(lost.worker,))
@@ -106,7 +107,7 @@ def _isolated(job: JobT, clock: NotingClock, body: Callable[[JobT, NotingClock],
     except Superseded as error:
         return Outcome(job.name, "failed", str(error), SUPERSEDED)
     except LfstereoError as error:
-        kind = DISK_FULL if _is_full(error) or _is_full(error.__cause__) else type(error).__name__
+        kind = DISK_FULL if _is_full(error) else type(error).__name__
         return Outcome(job.name, "failed", _one_line(error), kind)
     except MemoryError as error:
         reason = f"out of memory ({_one_line(error) or 'no details'}); use fewer --workers"
@@ -121,7 +122,12 @@ def _isolated(job: JobT, clock: NotingClock, body: Callable[[JobT, NotingClock],
 
 
 def _is_full(error: BaseException | None) -> bool:
-    return isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT)
+    """Return whether an error, or what it came from, is a full disk."""
+    while error is not None:
+        if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):
+            return True
+        error = error.__cause__
+    return False
 
 
 def _one_line(error: BaseException) -> str:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import secrets
 from collections.abc import Callable
+from concurrent.futures import Executor
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -13,9 +15,13 @@ from lfstereo.batch.jobs import WORK_FOLDER
 from lfstereo.batch.notes import Note
 from lfstereo.errors import ConfigError, InputError, MissingExtraError
 
-GPU = "GPU"
-"""Name of the resource that tells workers with a GPU: ``dask worker --resources GPU=1``."""
+GPU, CPU = "GPU", "CPU"
+"""Resources by which workers are told apart: ``dask worker --resources GPU=1`` for the network, ``CPU=1`` for the rest.
+
+Where a GPU is declared but no CPU, workers with a GPU may be given the other steps too.
+"""
 _CONNECT_S = 20
+_FIRST_WORKER_S = 60
 _WAITING_PER_WORKER = 1
 """Jobs beyond the running ones that wait at the scheduler, so that no worker is idle for a round trip."""
 
@@ -52,25 +58,21 @@ class ClusterCrew:
         except BaseException:
             self._client.close()
             raise
-        plain, gpus = self._addresses(False), self._addresses(True)
-        if plain and gpus:
-            near = self._client.get_executor(pure=False, workers=plain, allow_other_workers=True)
-            with_gpu = self._client.get_executor(pure=False, resources={GPU: 1})
+        workers, gpus, plain = self._count(None), self._count(GPU), self._count(CPU)
+        if gpus and gpus < workers:
+            apart = CPU if plain else None
             self.steps: tuple[Step, ...] = (
-                Step(work.focus, near, self._capacity(False)),
-                Step(work.match, with_gpu, self._capacity(True)),
+                Step(work.focus, self._executor(apart), self._capacity(apart)),
+                Step(work.match, self._executor(GPU), self._capacity(GPU)),
             )
         else:
-            everyone = self._client.get_executor(pure=False)
-            self.steps = (Step(work.whole, everyone, self._capacity(None)),)
+            self.steps = (Step(work.whole, self._executor(None), self._capacity(None)),)
         self.description = (
-            f"{len(plain) + len(gpus)} workers ({len(gpus)} with {GPU}) of {address}; "
-            f"dashboard {self._client.dashboard_link}"
+            f"{workers} workers ({gpus} with {GPU}) of {address}; dashboard {self._client.dashboard_link}"
         )
 
-    def stop(self, _: Note, /) -> bool:
-        """Do nothing: a worker of a cluster can only end itself."""
-        return False
+    def stop(self, _: Note, /) -> None:
+        """Do nothing: a worker ends itself, and the scheduler drops one that does not answer (``worker-ttl``)."""
 
     def close(self, at_once: bool) -> None:
         """Leave the cluster; it goes on without us."""
@@ -82,17 +84,21 @@ class ClusterCrew:
         found: dict[str, Any] = self._client.scheduler_info(n_workers=-1)["workers"]
         return found
 
-    def _addresses(self, gpu: bool) -> list[str]:
-        return [address for address, worker in self._workers().items() if bool(worker["resources"].get(GPU)) == gpu]
+    def _count(self, resource: str | None) -> int:
+        """Return the number of workers, or of those that say they have a resource."""
+        return sum(resource is None or resource in worker["resources"] for worker in self._workers().values())
 
-    def _capacity(self, gpu: bool | None) -> Callable[[], int]:
-        def now() -> int:
-            count = len(self._workers()) if gpu is None else len(self._addresses(gpu))
-            return max(1, count * (1 + _WAITING_PER_WORKER))
+    def _executor(self, resource: str | None) -> Executor:
+        wanted = {} if resource is None else {"resources": {resource: 1}}
+        executor: Executor = self._client.get_executor(pure=False, **wanted)
+        return executor
 
-        return now
+    def _capacity(self, resource: str | None) -> Callable[[], int]:
+        return lambda: max(1, self._count(resource) * (1 + _WAITING_PER_WORKER))
 
     def _check(self, address: str, output: Path) -> None:
+        with suppress(TimeoutError):
+            self._client.wait_for_workers(1, timeout=_FIRST_WORKER_S)
         if not self._workers():
             raise ConfigError(f"scheduler = {address}: it has no workers; start some with 'dask worker {address}'")
         word = secrets.token_hex(8)

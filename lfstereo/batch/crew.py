@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-import os
-import signal
-import socket
 from collections.abc import Callable
 from concurrent.futures import Executor
-from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -47,8 +43,8 @@ class Crew(Protocol):
     """One line for the user."""
     steps: tuple[Step, ...]
 
-    def stop(self, note: Note, /) -> bool:
-        """End a worker that does not answer; false where that cannot be done from here."""
+    def stop(self, note: Note, /) -> None:
+        """End a worker that is over its time and cannot end itself, where that can be done from here."""
 
     def close(self, at_once: bool) -> None:
         """Let the workers go."""
@@ -75,13 +71,10 @@ class LocalCrew:
             f"{cores} cores, {pair_gib:.1f} GiB each of {free:.1f} GiB free"
         )
 
-    def stop(self, note: Note, /) -> bool:
+    def stop(self, note: Note, /) -> None:
         """Kill the worker."""
-        if note.host != socket.gethostname():
-            return False
-        with suppress(ProcessLookupError):
-            os.kill(note.process, signal.SIGKILL)
-        return True
+        for pool in self._pools:
+            pool.kill(note.process)
 
     def close(self, at_once: bool) -> None:
         """End the processes."""

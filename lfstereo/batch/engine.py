@@ -12,7 +12,7 @@ from typing import Any
 from lfstereo.batch.attempts import DISK_FULL, verdict_on_loss
 from lfstereo.batch.crew import Crew, Step
 from lfstereo.batch.jobs import Job, Outcome
-from lfstereo.batch.notes import TIME_LIMIT, Note, mark_stopped, read_note
+from lfstereo.batch.notes import TIME_LIMIT, Note, read_note
 
 _TICK_S = 1.0
 _GRACE_S = 20.0
@@ -120,6 +120,9 @@ class Engine:
         note = read_note(job.note)
         if note is None or note.token != job.token:
             note = Note(job.token, self._lost[job.name], "", 0, "start", 0.0)
+        since = self._seen.get((job.name, flight.at, note.attempt), time.monotonic())
+        if time.monotonic() - since >= job.time_limit_s:
+            note = replace(note, stopped=TIME_LIMIT)  # its hard stop left no last words
         verdict = verdict_on_loss(job, replace(note, attempt=max(note.attempt, self._lost[job.name])))
         if verdict is None:
             self._waiting[flight.at].appendleft(flight)
@@ -130,19 +133,14 @@ class Engine:
     def _look_after(self) -> None:
         """Read the workers' notes; end a worker that is over its time and did not end itself."""
         notes = []
-        for future, flight in list(self._flying.items()):
+        for flight in self._flying.values():
             note = read_note(flight.job.note)
             if note is None or note.token != flight.job.token:
                 continue
             notes.append(note)
             since = self._seen.setdefault((flight.job.name, flight.at, note.attempt), time.monotonic())
             if time.monotonic() - since > flight.job.time_limit_s + _GRACE_S:
-                mark_stopped(flight.job.note, TIME_LIMIT)
-                if not self._crew.stop(note):
-                    del self._flying[future]
-                    future.cancel()
-                    verdict = verdict_on_loss(flight.job, replace(note, stopped=TIME_LIMIT))
-                    self._ended(_together(flight.before, verdict or Outcome(flight.job.name, "failed")))
+                self._crew.stop(note)
         self._tick(notes)
 
 

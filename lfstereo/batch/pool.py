@@ -52,8 +52,15 @@ class WorkerPool(Executor):
         """End the workers; with ``wait`` after what they do now, else at once."""
         for pool in self._pools:
             if not wait:
-                _kill(pool)
+                for pid in _processes(pool):
+                    self.kill(pid)
             pool.shutdown(wait, cancel_futures=cancel_futures or not wait)
+
+    def kill(self, pid: int) -> None:
+        """Kill a worker by its process number, if it is one of these; its call ends with a broken pool."""
+        if any(pid in _processes(pool) for pool in self._pools):
+            with suppress(ProcessLookupError):
+                os.kill(pid, signal.SIGKILL)
 
     def _replace(self, index: int) -> None:
         self._pools[index].shutdown(wait=False)
@@ -64,7 +71,6 @@ class WorkerPool(Executor):
         return ProcessPoolExecutor(1, multiprocessing.get_context("spawn"), start_worker, (self._threads,))
 
 
-def _kill(pool: ProcessPoolExecutor) -> None:
-    for pid in list(getattr(pool, "_processes", None) or ()):
-        with suppress(ProcessLookupError):
-            os.kill(pid, signal.SIGKILL)
+def _processes(pool: ProcessPoolExecutor) -> tuple[int, ...]:
+    """Return the process numbers of a standard pool, which has no public way to tell them."""
+    return tuple(getattr(pool, "_processes", None) or ())
