@@ -12,7 +12,7 @@ _LUMA = np.array([0.2126, 0.7152, 0.0722], np.float32)
 """Weights of linear RGB in luminance, ITU-R BT.709."""
 _SMALLEST_PX = 8
 _SHARPNESS_POWER = 4.0
-_TINY = 1e-12
+_TINY = 1e-20
 
 
 def fuse_slices(slices: Float32) -> Rgb:
@@ -46,22 +46,14 @@ def fuse_slices(slices: Float32) -> Rgb:
     if slices.ndim != 4 or slices.shape[0] < 1 or slices.shape[3] != 3:
         raise ShapeError(f"slices: found an array of shape {slices.shape}, expected (K, V, U, 3) with at least one")
     levels = max(0, int(np.log2(max(min(slices.shape[1:3]) / _SMALLEST_PX, 1))))
-    details: list[Float32] = []
-    weights: list[Float32] = []
-    coarsest = np.zeros(1, np.float32)
-    for slice_ in slices:
-        pyramid = _details(slice_, levels)
-        for level, detail in enumerate(pyramid[:-1]):
-            share = _contrast(detail) ** _SHARPNESS_POWER + np.float32(_TINY)
-            if len(details) <= level:
-                details.append(np.zeros_like(detail))
-                weights.append(np.zeros_like(share))
-            details[level] += detail * share[..., None]
-            weights[level] += share
-        coarsest = coarsest + pyramid[-1] / len(slices)
-    picture = coarsest
-    for detail, weight in zip(reversed(details), reversed(weights), strict=True):
-        picture = _larger(picture, detail.shape[:2]) + detail / weight[..., None]
+    pyramids = [_details(slice_, levels) for slice_ in slices]
+    picture = np.mean([pyramid[-1] for pyramid in pyramids], axis=0, dtype=np.float32)
+    for level in reversed(range(levels)):
+        details = np.stack([pyramid[level] for pyramid in pyramids])
+        contrast = np.stack([_contrast(detail) for detail in details])
+        share = (contrast / np.maximum(contrast.max(axis=0), _TINY)) ** _SHARPNESS_POWER + np.float32(_TINY)
+        share /= share.sum(axis=0)
+        picture = _larger(picture, details.shape[1:3]) + np.einsum("kvu,kvuc->vuc", share, details)
     fused: Rgb = np.maximum(picture, 0).astype(np.float32)
     return fused
 
