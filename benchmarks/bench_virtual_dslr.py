@@ -12,9 +12,9 @@ import cv2
 import numpy as np
 
 from lfstereo.simulate.virtual_dslr import VirtualDslrOptions, lens_points, virtual_dslr
-from lfstereo.training.samples import shear_add
 from lfstereo.training.scenes import Scene, random_scene, render
 from lfstereo.training.textures import texture_bank
+from lfstereo.training.tracing import shear_add
 
 SCENES = 8
 SIZE = (192, 256)

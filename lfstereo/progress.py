@@ -22,13 +22,14 @@ def silent(done: int, total: int) -> None:
 @contextmanager
 def progress_bar(label: str) -> Iterator[Progress]:
     """Draw one bar on stderr for the stage run inside the ``with`` block; in a log file, one line at its end."""
+    if not sys.stderr.isatty():
+        started = time.perf_counter()
+        yield silent
+        print(f"{label:<22} {time.perf_counter() - started:.1f} s", file=sys.stderr)
+        return
     from tqdm import tqdm
 
-    terminal = sys.stderr.isatty()
-    started = time.perf_counter()
-    with tqdm(
-        desc=f"{label:<22}", file=sys.stderr, total=1, bar_format="{desc} {bar:24} {elapsed}", disable=not terminal
-    ) as bar:
+    with tqdm(desc=f"{label:<22}", file=sys.stderr, total=1, bar_format="{desc} {bar:24} {elapsed}") as bar:
 
         def report(done: int, total: int) -> None:
             bar.total = total
@@ -38,8 +39,6 @@ def progress_bar(label: str) -> Iterator[Progress]:
         yield report
         bar.n = bar.total
         bar.refresh()
-    if not terminal:
-        print(f"{label:<22} {time.perf_counter() - started:.1f} s", file=sys.stderr)
 
 
 @dataclass(frozen=True, slots=True)

@@ -38,6 +38,9 @@ class FocusNet(nn.Module):
             nn.Conv2d(width, 1, 3, 1, 1),
         )
         initialise(self)
+        for name, weight in self.branches.named_parameters():
+            if name.endswith(".0.conv.weight"):  # the convolution by which a branch begins
+                _start_from_differences(weight, slices)
 
     def forward(self, stack: Tensor) -> Prediction:
         """Turn ``(B, K, 3, H, W)``, sizes multiples of 8, into the fraction of the stack's disparity range."""
@@ -50,6 +53,13 @@ def _branch(inputs: int, width: int, stride: int) -> nn.Sequential:
     enter = ConvBlock(inputs, channels) if stride == 1 else ConvBlock(inputs, channels, 2 * stride + 1, stride)
     leave = ConvBlock(channels, width) if stride == 1 else DeconvBlock(channels, width, stride)
     return nn.Sequential(enter, *(ConvBlock(channels, channels) for _ in range(4)), leave)
+
+
+@torch.no_grad()
+def _start_from_differences(weight: Tensor, slices: int) -> None:
+    """Let the first filters start blind to what all slices share, which otherwise drowns the differences of focus."""
+    per_slice = weight.view(weight.shape[0], slices, 3, *weight.shape[2:])
+    per_slice -= per_slice.mean(dim=1, keepdim=True)
 
 
 class PlainStack(nn.Module):

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor
 
 from lfstereo.arrays import Float32
@@ -87,29 +88,50 @@ class PoolBatches:
         """One sample as ``(2, 16, 3, H, W)``, ``(2, 3, H, W)``, ``(1, H, W)``, ``(1, H, W)``."""
         stacks, sharp = self.pool.stacks[index], self.pool.sharp[index]
         disparity, valid = self.pool.disparity[index], self.pool.valid[index]
-        if self.crop:
-            rows, columns = _window(rng, disparity.shape[1:], self.crop)
-            stacks, sharp = stacks[:, :, rows, columns], sharp[:, rows, columns]
-            disparity, valid = disparity[:, rows, columns], valid[:, rows, columns]
+        change = draw_variation(rng, (disparity.shape[1], disparity.shape[2]), self.crop)
+        rows, columns = change.rows, change.columns
+        stacks, sharp = stacks[:, :, rows, columns], sharp[:, rows, columns]
+        disparity, valid = disparity[:, rows, columns], valid[:, rows, columns]
         left = 0
-        if rng.random() < 0.5:  # a mirror exchanges the eyes: the mirrored right image is the new left one
+        if change.mirrored:
             left = 1
             stacks, sharp = stacks[::-1, :, :, ::-1], sharp[::-1, :, ::-1]
             disparity, valid = disparity[..., ::-1], valid[..., ::-1]
-        if rng.random() < 0.5:
+        if change.flipped:
             stacks, sharp = stacks[:, :, ::-1], sharp[:, ::-1]
             disparity, valid = disparity[:, ::-1], valid[:, ::-1]
-        channels = rng.permutation(3)
-        table = _tone_curve(rng)
         return (
-            torch.from_numpy(table[stacks[..., channels]]).movedim(-1, 2).contiguous(),
-            torch.from_numpy(table[sharp[..., channels]]).movedim(-1, 1).contiguous(),
+            torch.from_numpy(change.tone[stacks[..., change.channels]]).movedim(-1, 2).contiguous(),
+            torch.from_numpy(change.tone[sharp[..., change.channels]]).movedim(-1, 1).contiguous(),
             torch.from_numpy(disparity[left : left + 1].astype(np.float32) / (100 * DISPARITY_STEPS_PER_PX)),
             torch.from_numpy(np.array(valid[left : left + 1]) > 0),
         )
 
 
-def _window(rng: np.random.Generator, size: tuple[int, ...], crop: tuple[int, int]) -> tuple[slice, slice]:
+@dataclass(frozen=True, slots=True)
+class Variation:
+    """How a rendered sample is varied before it is learnt from."""
+
+    rows: slice
+    columns: slice
+    mirrored: bool
+    """A mirror exchanges the eyes: the mirrored right image is the new left one."""
+    flipped: bool
+    """Upside down."""
+    channels: NDArray[np.int64]
+    """``(3,)`` order of the colours."""
+    tone: Float32
+    """``(256,)`` new value of each 8-bit level, 0 to 1; black stays black."""
+
+
+def draw_variation(rng: np.random.Generator, size: tuple[int, int], crop: tuple[int, int] | None) -> Variation:
+    """Draw the variation of a sample of ``size`` (height, width) of which ``crop`` is kept."""
+    rows, columns = _window(rng, size, crop) if crop else (slice(None), slice(None))
+    mirrored, flipped = rng.random() < 0.5, rng.random() < 0.5
+    return Variation(rows, columns, mirrored, flipped, rng.permutation(3), _tone_curve(rng))
+
+
+def _window(rng: np.random.Generator, size: tuple[int, int], crop: tuple[int, int]) -> tuple[slice, slice]:
     rows, columns = (int(rng.integers(0, whole - part + 1)) for whole, part in zip(size, crop, strict=True))
     return slice(rows, rows + crop[0]), slice(columns, columns + crop[1])
 

@@ -9,26 +9,31 @@ Smith, Topin, "Super-convergence" (2018): the one-cycle schedule.
 from __future__ import annotations
 
 import math
-import sys
 import time
-from collections.abc import Callable
+from collections.abc import Iterator
 from pathlib import Path
 
 import torch
+from torch import Tensor, nn
+from torch.nn.parallel import DistributedDataParallel
 
 from lfstereo.errors import ConfigError
 from lfstereo.network.bdff_net import Architecture, BdffNet
 from lfstereo.network.blocks import channels_last
 from lfstereo.progress import Progress, silent
-from lfstereo.training.batches import Batch, PairBatches, PoolBatches, prefetched
+from lfstereo.training.batches import Batch
 from lfstereo.training.checkpoint import Counters, load_checkpoint, read_weights, save_checkpoint
+from lfstereo.training.curve import Curve
 from lfstereo.training.pool import fill_pool, open_pool
 from lfstereo.training.recipe import Recipe
+from lfstereo.training.sources import Rings, batches
 from lfstereo.training.stages import LOSSES, PARTS, select_parts
+from lfstereo.training.workers import Worker
 
 WARM_UP = 0.08
 CLIP_NORM = 1.0
 _LOG_EVERY = 20
+CURVE = "curve.csv"
 
 
 def one_cycle(fraction: float) -> float:
@@ -53,8 +58,10 @@ def train(
     resume: bool = False,
     progress: Progress = silent,
     stop_at: int | None = None,
+    worker: Worker = Worker(torch.device("cpu")),
+    rings: Rings | None = None,
 ) -> Counters:
-    """Train one stage and leave a checkpoint.
+    """Train one stage and leave a checkpoint and the curve of its loss.
 
     Parameters
     ----------
@@ -70,6 +77,10 @@ def train(
         Told how much of the run is done, in thousandths.
     stop_at
         Leave off after this step, to go on later.
+    worker
+        Device, and this process among several.
+    rings
+        Filled rings of earlier stages; the one used here is put in.
 
     Raises
     ------
@@ -86,72 +97,88 @@ def train(
     torch.manual_seed(recipe.seed)
     network = BdffNet(architecture)
     _start_from(network, recipe.start_from)
+    network.to(worker.device)
     channels_last(network)
     parameters = select_parts(network, recipe.stage)
     optimiser = torch.optim.AdamW(parameters, recipe.rate, weight_decay=recipe.weight_decay)
     counters = load_checkpoint(output, network, optimiser) if resume else Counters(recipe.stage, 0, 0.0)
     if resume:
         channels_last(network)
-    return _run(recipe, network, optimiser, counters, output, minutes, progress, stop_at)
+    run = _Run(recipe, network, optimiser, output, worker, counters)
+    source = batches(
+        recipe, worker, {} if rings is None else rings, counters.step, min(recipe.steps, stop_at or recipe.steps)
+    )
+    return run.follow(source, 60 * minutes if minutes else math.inf, progress)
 
 
-def _run(
-    recipe: Recipe,
-    network: BdffNet,
-    optimiser: torch.optim.AdamW,
-    counters: Counters,
-    output: Path,
-    minutes: float | None,
-    progress: Progress,
-    stop_at: int | None,
-) -> Counters:
-    loss_of = LOSSES[recipe.stage]
-    step, elapsed, budget = counters.step, counters.elapsed_s, 60 * minutes if minutes else math.inf
-    started = saved = time.monotonic()
-    recent: list[float] = []
-    for batch in prefetched(_batches(recipe), step, min(recipe.steps, stop_at or recipe.steps)):
-        fraction = max(step / recipe.steps, elapsed / budget)
-        if fraction >= 1:
-            break
-        for group in optimiser.param_groups:
-            group["lr"] = recipe.rate * one_cycle(fraction)
-        recent.append(_step(network, optimiser, loss_of, batch))
-        step += 1
-        now = time.monotonic()
-        elapsed = counters.elapsed_s + now - started
-        if step % _LOG_EVERY == 0:
-            print(f"{recipe.stage} step {step} {elapsed:.0f} s loss {sum(recent) / len(recent):.5f}", file=sys.stderr)
-            recent.clear()
-        progress(int(1000 * fraction), 1000)
-        if now - saved > recipe.save_every:
-            save_checkpoint(output, network, optimiser, Counters(recipe.stage, step, elapsed))
-            saved = now
-    done = Counters(recipe.stage, step, elapsed)
-    save_checkpoint(output, network, optimiser, done)
-    return done
+class StageLoss(nn.Module):
+    """The loss of a stage as a module, so that several processes can average its gradients."""
+
+    def __init__(self, network: BdffNet, stage: str, mixed: bool) -> None:
+        super().__init__()
+        self.network, self.stage, self.mixed = network, stage, mixed
+
+    def forward(self, batch: Batch) -> Tensor:
+        """Return the loss of a batch; in bfloat16 where that is exact enough, if ``mixed``."""
+        with torch.autocast(batch.disparity.device.type, torch.bfloat16, enabled=self.mixed):
+            return LOSSES[self.stage](self.network, batch)
 
 
-def _step(
-    network: BdffNet,
-    optimiser: torch.optim.AdamW,
-    loss_of: Callable[[BdffNet, Batch], torch.Tensor],
-    batch: Batch,
-) -> float:
-    optimiser.zero_grad(set_to_none=True)
-    loss = loss_of(network, batch)
-    loss.backward()  # type: ignore[no-untyped-call]
-    torch.nn.utils.clip_grad_norm_([p for g in optimiser.param_groups for p in g["params"]], CLIP_NORM)
-    optimiser.step()
-    return float(loss.detach())
+class _Run:
+    """One stage under way."""
 
+    def __init__(
+        self,
+        recipe: Recipe,
+        network: BdffNet,
+        optimiser: torch.optim.AdamW,
+        output: Path,
+        worker: Worker,
+        counters: Counters,
+    ) -> None:
+        self.recipe, self.network, self.optimiser = recipe, network, optimiser
+        self.output, self.worker, self.counters = output, worker, counters
+        mixed = recipe.precision == "bfloat16" or (recipe.precision == "auto" and worker.device.type == "cuda")
+        loss: nn.Module = StageLoss(network, recipe.stage, mixed)
+        self.loss = DistributedDataParallel(loss) if worker.count > 1 else loss
+        self.curve = Curve(output / CURVE, counters.step)
 
-def _batches(recipe: Recipe) -> Callable[[int], Batch]:
-    if recipe.stage == "stereo":
-        return PairBatches(recipe.seed, recipe.batch, recipe.height, recipe.width, recipe.textures)
-    if not recipe.pool:
-        raise ConfigError(f"stage {recipe.stage}: no pool is named; render one with stage 'pool' and give its folder")
-    pool = open_pool(Path(recipe.pool), recipe.pool_size, recipe.height, recipe.width, recipe.seed)
-    return PoolBatches(pool, recipe.seed, recipe.batch, recipe.crop)
+    def follow(self, source: Iterator[Batch], budget_s: float, progress: Progress) -> Counters:
+        """Take steps until the batches or the time end."""
+        before, started = self.counters, time.monotonic()
+        saved = started
+        recent: list[Tensor] = []
+        for batch in source:
+            elapsed = self.worker.agree(self.counters.elapsed_s)
+            step = self.counters.step
+            fraction = max(step / self.recipe.steps, elapsed / budget_s)
+            if fraction >= 1:
+                break
+            recent.append(self._step(batch, self.recipe.rate * one_cycle(fraction)))
+            self.counters = Counters(self.recipe.stage, step + 1, before.elapsed_s + time.monotonic() - started)
+            progress(int(1000 * fraction), 1000)
+            if not self.worker.leads:
+                continue
+            if (step + 1) % _LOG_EVERY == 0:
+                rate = self.optimiser.param_groups[0]["lr"]
+                self.curve.add(self.counters, rate, float(torch.stack(recent).mean()))
+                recent.clear()
+            if time.monotonic() - saved > self.recipe.save_every:
+                save_checkpoint(self.output, self.network, self.optimiser, self.counters)
+                saved = time.monotonic()
+        if self.worker.leads:
+            save_checkpoint(self.output, self.network, self.optimiser, self.counters)
+        return self.counters
+
+    def _step(self, batch: Batch, rate: float) -> Tensor:
+        for group in self.optimiser.param_groups:
+            group["lr"] = rate
+        self.optimiser.zero_grad(set_to_none=True)
+        loss: Tensor = self.loss(batch)
+        loss.backward()  # type: ignore[no-untyped-call]
+        torch.nn.utils.clip_grad_norm_([p for g in self.optimiser.param_groups for p in g["params"]], CLIP_NORM)
+        self.optimiser.step()
+        return loss.detach()
 
 
 def _start_from(network: BdffNet, sources: tuple[str, ...]) -> None:

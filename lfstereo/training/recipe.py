@@ -9,15 +9,15 @@ from typing import Literal
 from lfstereo.network.bdff_net import Architecture
 from lfstereo.options import from_mapping, option, read_toml
 
-STAGES = ("pool", "stereo", "edof", "focus", "guided", "stereo_stacks", "fusion", "joint")
+STAGES = ("pool", "stereo", "edof", "focus_planes", "focus", "guided", "stereo_stacks", "fusion", "joint")
 
 
 @dataclass(frozen=True, slots=True)
 class Recipe:
     """What one training run does; a TOML file holds it, with an ``[architecture]`` table for the network."""
 
-    stage: Literal["pool", "stereo", "edof", "focus", "guided", "stereo_stacks", "fusion", "joint"] = option(
-        "stereo", "what is trained; 'pool' only renders the stacks that the other stages read"
+    stage: Literal["pool", "stereo", "edof", "focus_planes", "focus", "guided", "stereo_stacks", "fusion", "joint"] = (
+        option("stereo", "what is trained; 'pool' only renders the stacks that the other stages read")
     )
     seed: int = option(1, "decides scenes, order and initial weights")
     steps: int = option(100000, "most steps; a limit in minutes may end the run earlier")
@@ -29,6 +29,14 @@ class Recipe:
     textures: int = option(96, "textures in the bank at any time")
     pool: str = option("", "folder of rendered stack pairs, for the stages that learn from stacks")
     pool_size: int = option(600, "stack pairs in the pool")
+    source: Literal["auto", "pool", "ring"] = option(
+        "auto", "samples from a pool on disk, or from a ring on the training device; auto: a ring on a graphics card"
+    )
+    ring: int = option(512, "stack pairs that a ring holds")
+    fresh: float = option(0.5, "stack pairs of a ring that are replaced at each step")
+    precision: Literal["auto", "float32", "bfloat16"] = option(
+        "auto", "of the network in training; auto: bfloat16 on a graphics card"
+    )
     start_from: tuple[str, ...] = option((), "'PART=FOLDER' takes a part's weights from an earlier run's folder")
     crop: tuple[int, int] | None = option(None, "height and width cut from each sample of the pool", "px")
     save_every: float = option(120.0, "time between checkpoints", "s")

@@ -9,7 +9,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import cv2
-import numba
 import numpy as np
 
 from lfstereo.arrays import Bool, Float32, Float64
@@ -19,6 +18,8 @@ from lfstereo.training.scenes import Scene, random_scene, render
 
 PUPIL_POINTS = 21
 """Points of each pupil that a stack averages."""
+LEAST_BLUR_PX = 0.2
+"""A weaker blur is left out."""
 SLICE_DISPARITIES = np.linspace(DISPARITY_RANGE_PX, 0.0, SLICES_DEFAULT, dtype=np.float32)
 """``(16,)`` px, near to far."""
 
@@ -72,11 +73,11 @@ def pupil_points(count: int, turn_rad: float = 0.0) -> Float32:
 def pair_sample(rng: np.random.Generator, textures: Float32, height: int, width: int) -> PairSample:
     """Render an all-in-focus pair with the faults of real cameras: noise, blur, unequal exposure, misalignment."""
     scene = random_scene(rng, textures, height, width)
-    left, right = render(scene, 0, 0, samples=2), render(scene, 1, 0, samples=2, shift_y=_misalignment(rng))
-    images = [left.image, right.image * _photometric(rng)]
-    exposure, blur = exposure_of(*images), _blur_px(rng)
+    left, right = render(scene, 0, 0, samples=2), render(scene, 1, 0, samples=2, shift_y=draw_misalignment(rng))
+    images = [left.image, right.image * draw_gain(rng)]
+    exposure, blur = exposure_of(*images), draw_blur_px(rng)
     peak, read = np.exp(rng.uniform(np.log(80), np.log(20000))), rng.uniform(0, 0.01)
-    margin = _margins(rng, height, width)
+    margin = draw_margins(rng, height, width)
     encoded = []
     for image, lit in zip(images, margin, strict=True):
         smooth = _blur(image, blur * rng.uniform(0.8, 1.2)) / exposure
@@ -103,16 +104,14 @@ def stack_sample(
         Blur diameter per px of disparity; drawn from 0.05 to 0.4, mostly 0.08 to 0.2, where not given.
     """
     scene = random_scene(rng, textures, height, width)
-    ratio = aperture_ratio or _aperture_ratio(rng)
-    gains, misalignment = (np.ones(3, np.float32), _photometric(rng)), (0.0, _misalignment(rng))
+    ratio = aperture_ratio or draw_aperture_ratio(rng)
+    gains, misalignment = (np.ones(3, np.float32), draw_gain(rng)), (0.0, draw_misalignment(rng))
     sharp_views = [render(scene, eye, 0, samples=4, shift_y=misalignment[eye]) for eye in (0, 1)]
-    peak, read = np.exp(rng.uniform(np.log(20), np.log(3000))), rng.uniform(0, 0.03)
+    level = draw_noise(rng)
     exposure = exposure_of(*(v.image for v in sharp_views))
     noise = rng.standard_normal(6 * (height + 64) * (width + 64), dtype=np.float32)
-    linear = [
-        _stack(rng, scene, eye, ratio, misalignment[eye], gains[eye] / exposure, (peak, read), noise) for eye in (0, 1)
-    ]
-    blur, margin = _blur_px(rng), _margins(rng, height, width)
+    linear = [_stack(rng, scene, eye, ratio, misalignment[eye], gains[eye] / exposure, level, noise) for eye in (0, 1)]
+    blur, margin = draw_blur_px(rng), draw_margins(rng, height, width)
     white = exposure_of(*linear)
     stacks = np.stack([[encode(_blur(s, blur), white) for s in stack] for stack in linear])
     sharp = [encode(_blur(v.image * gain / exposure, blur), white) for v, gain in zip(sharp_views, gains, strict=True)]
@@ -131,6 +130,8 @@ def _stack(
     noise_level: tuple[float, float],
     noise: Float32,
 ) -> Float32:
+    from lfstereo.training.tracing import shear_add  # compiled, and only needed where scenes are rendered here
+
     points = pupil_points(PUPIL_POINTS, rng.uniform(0, 2 * np.pi)) * (ratio / 2)
     margin = int(np.ceil(np.abs(points).max() * DISPARITY_RANGE_PX)) + 2
     total = np.zeros((SLICES_DEFAULT, scene.height, scene.width, 3), np.float32)
@@ -144,63 +145,45 @@ def _stack(
     return total / np.float32(len(points))
 
 
-@numba.njit(cache=True, nogil=True, fastmath=True)  # type: ignore[untyped-decorator]
-def shear_add(view: Float32, shift_x: Float32, shift_y: Float32, margin: int, total: Float32) -> None:
-    """Add one view to every slice, moved so that the slice's disparity lines up.
-
-    Parameters
-    ----------
-    view
-        ``(H + 2 margin, W + 2 margin, 3)``.
-    shift_x, shift_y
-        ``(K,)`` px: slice k takes the view at ``(x - shift_x[k], y - shift_y[k])``.
-    margin
-        px, larger than any shift.
-    total
-        ``(K, H, W, 3)``, added to in place.
-    """
-    count, height, width, _ = total.shape
-    flat = view.reshape(view.shape[0], view.shape[1] * 3)
-    for k in range(count):
-        x, y = margin - shift_x[k], margin - shift_y[k]
-        i, j = int(np.floor(y)), int(np.floor(x))
-        a, b = np.float32(y - i), np.float32(x - j)
-        one = np.float32(1.0)
-        w00, w01, w10, w11 = (one - a) * (one - b), (one - a) * b, a * (one - b), a * b
-        out = total[k].reshape(height, width * 3)
-        for r in range(height):
-            upper, lower, target = flat[r + i, 3 * j :], flat[r + i + 1, 3 * j :], out[r]
-            for c in range(width * 3):
-                target[c] += w00 * upper[c] + w01 * upper[c + 3] + w10 * lower[c] + w11 * lower[c + 3]
+def draw_noise(rng: np.random.Generator) -> tuple[float, float]:
+    """Draw the photons of white in one view and the standard deviation of the read noise (of white 1)."""
+    return float(np.exp(rng.uniform(np.log(20), np.log(3000)))), float(rng.uniform(0, 0.03))
 
 
-def _aperture_ratio(rng: np.random.Generator) -> float:
+def draw_aperture_ratio(rng: np.random.Generator) -> float:
+    """Draw D/B: 0.05 to 0.4, mostly 0.08 to 0.2."""
     if rng.random() < 0.7:
         return float(rng.uniform(0.08, 0.2))
     return float(np.exp(rng.uniform(np.log(0.05), np.log(0.4))))
 
 
-def _misalignment(rng: np.random.Generator) -> float:
+def draw_misalignment(rng: np.random.Generator) -> float:
+    """Draw by how many px the right picture lies too low."""
     return float(rng.uniform(-0.5, 0.5))
 
 
-def _photometric(rng: np.random.Generator) -> Float32:
+def draw_gain(rng: np.random.Generator) -> Float32:
+    """Draw the exposure of the right camera's channels relative to the left one's, ``(3,)``."""
     return np.asarray(rng.uniform(0.95, 1.05) * rng.uniform(0.98, 1.02, 3), np.float32)
 
 
-def _blur_px(rng: np.random.Generator) -> float:
+def draw_blur_px(rng: np.random.Generator) -> float:
+    """Draw the standard deviation (px) of the blur that lens and sampling add everywhere."""
     return float(rng.uniform(0.3, 0.9)) if rng.random() < 0.6 else 0.0
 
 
 def _blur(image: Float32 | Float64, sigma: float) -> Float32:
     image = np.asarray(image, np.float32)
-    if sigma < 0.2:
+    if sigma < LEAST_BLUR_PX:
         return image
     return np.asarray(cv2.GaussianBlur(image, (0, 0), sigma, borderType=cv2.BORDER_REFLECT), np.float32)
 
 
-def _margins(rng: np.random.Generator, height: int, width: int) -> Bool:
-    """Black borders as a rectification leaves them: a slightly turned edge on some sides, for each eye."""
+def draw_margins(rng: np.random.Generator, height: int, width: int) -> Bool:
+    """Draw ``(2, height, width)``, false in black borders as a rectification leaves them.
+
+    Each eye has slightly turned edges on some of its sides.
+    """
     lit = np.ones((2, height, width), bool)
     if rng.random() < 0.65:
         return lit

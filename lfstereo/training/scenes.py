@@ -13,10 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from lfstereo.arrays import Float32, Float64
-from lfstereo.training.tracing import Column, shade, trace
+from lfstereo.training.layers import Column
 
-SHAPES = ("everywhere", "box", "ellipse", "star", "frame", "comb")
-_SUBPIXELS = {
+SUBPIXELS = {
     1: ((0.0, 0.0),),
     2: ((-0.25, -0.25), (0.25, 0.25)),
     4: ((-0.25, -0.25), (0.25, -0.25), (-0.25, 0.25), (0.25, 0.25)),
@@ -161,11 +160,13 @@ def render(scene: Scene, u_x: float, u_y: float, margin: int = 0, shift_y: float
     View
         ``H + 2 margin`` by ``W + 2 margin``.
     """
+    from lfstereo.training.tracing import shade, trace  # compiled, and only needed where scenes are rendered here
+
     h, w = scene.height + 2 * margin, scene.width + 2 * margin
     disparity, layer = np.empty((h, w), np.float32), np.empty((h, w), np.float32)
     image, part = np.zeros((h, w, 3), np.float32), np.empty((h, w, 3), np.float32)
     eye = np.array((u_x, u_y), np.float32)
-    offsets = _SUBPIXELS[samples]
+    offsets = SUBPIXELS[samples]
     for dx, dy in offsets:
         x0, y0 = dx - margin, dy - margin - shift_y
         trace(scene.layers, eye, x0, y0, disparity, layer)

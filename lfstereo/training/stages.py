@@ -17,6 +17,7 @@ PARTS = ("edof", "focus", "guided", "stereo", "fusion")
 TRAINED: dict[str, tuple[str, ...]] = {
     "stereo": ("stereo",),
     "edof": ("edof",),
+    "focus_planes": ("focus",),
     "focus": ("focus",),
     "guided": ("guided",),
     "stereo_stacks": ("stereo",),
@@ -86,6 +87,7 @@ def _joint(network: BdffNet, batch: Batch) -> Tensor:
 LOSSES: dict[str, Callable[[BdffNet, Batch], Tensor]] = {
     "stereo": _stereo,
     "edof": _edof,
+    "focus_planes": _focus,
     "focus": _focus,
     "guided": _guided,
     "stereo_stacks": _stereo_stacks,

@@ -1,44 +1,12 @@
-"""The inner loops of the scene renderer: rays against layers, and textures."""
+"""The inner loops of the scene renderer on a processor: rays against layers, textures, sheared sums of views."""
 
 from __future__ import annotations
-
-import enum
 
 import numba
 import numpy as np
 
 from lfstereo.arrays import Float32
-
-
-class Column(enum.IntEnum):
-    """Columns of the layer table."""
-
-    SHAPE = 0  # index into scenes.SHAPES
-    CX = 1  # centre, px of the left view
-    CY = 2
-    HALF_W = 3  # half size, px
-    HALF_H = 4
-    COS = 5  # turn of the silhouette
-    SIN = 6
-    D = 7  # disparity at the centre, px
-    D_X = 8  # its slope
-    D_Y = 9
-    BUMP = 10  # how far the surface falls back towards the rim, px of disparity
-    RIPPLE = 11  # amplitude, px of disparity
-    WAVE_X = 12  # rad per px
-    WAVE_Y = 13
-    PHASE = 14
-    POINTS = 15  # points of a star, teeth of a comb
-    DEPTH = 16  # depth of a star's notches, width of a frame, duty of a comb
-    TEXTURE = 17  # index into the bank
-    TEX_COS = 18  # texels per px, turned
-    TEX_SIN = 19
-    TEX_U = 20
-    TEX_V = 21
-    GAIN = 22  # three channels
-    OFFSET = 25  # three channels
-    COUNT = 28
-
+from lfstereo.training.layers import NEWTON_STEPS, Column
 
 SHAPE = int(Column.SHAPE)
 CX = int(Column.CX)
@@ -65,7 +33,6 @@ TEX_V = int(Column.TEX_V)
 GAIN = int(Column.GAIN)
 OFFSET = int(Column.OFFSET)
 COLUMNS = int(Column.COUNT)
-NEWTON_STEPS = 3
 
 
 @numba.njit(cache=True, nogil=True, fastmath=True, inline="always")  # type: ignore[untyped-decorator]
@@ -211,3 +178,33 @@ def shade(
                 texel = textures[n, i, j, k] * w00 + textures[n, i, j1, k] * w01
                 texel += textures[n, i1, j, k] * w10 + textures[n, i1, j1, k] * w11
                 image[r, c, k] = layers[index, GAIN + k] * texel + layers[index, OFFSET + k]
+
+
+@numba.njit(cache=True, nogil=True, fastmath=True)  # type: ignore[untyped-decorator]
+def shear_add(view: Float32, shift_x: Float32, shift_y: Float32, margin: int, total: Float32) -> None:
+    """Add one view to every slice, moved so that the slice's disparity lines up.
+
+    Parameters
+    ----------
+    view
+        ``(H + 2 margin, W + 2 margin, 3)``.
+    shift_x, shift_y
+        ``(K,)`` px: slice k takes the view at ``(x - shift_x[k], y - shift_y[k])``.
+    margin
+        px, larger than any shift.
+    total
+        ``(K, H, W, 3)``, added to in place.
+    """
+    count, height, width, _ = total.shape
+    flat = view.reshape(view.shape[0], view.shape[1] * 3)
+    for k in range(count):
+        x, y = margin - shift_x[k], margin - shift_y[k]
+        i, j = int(np.floor(y)), int(np.floor(x))
+        a, b = np.float32(y - i), np.float32(x - j)
+        one = np.float32(1.0)
+        w00, w01, w10, w11 = (one - a) * (one - b), (one - a) * b, a * (one - b), a * b
+        out = total[k].reshape(height, width * 3)
+        for r in range(height):
+            upper, lower, target = flat[r + i, 3 * j :], flat[r + i + 1, 3 * j :], out[r]
+            for c in range(width * 3):
+                target[c] += w00 * upper[c] + w01 * upper[c + 3] + w10 * lower[c] + w11 * lower[c + 3]

@@ -4,9 +4,9 @@ import cv2
 import numpy as np
 import pytest
 
+from lfstereo.training.layers import Column
 from lfstereo.training.scenes import Scene, random_scene, render
 from lfstereo.training.textures import KINDS, octave_noise, texture_bank
-from lfstereo.training.tracing import Column
 
 HEIGHT, WIDTH = 64, 128
 DISPARITY_PX = 2e-3

@@ -4,17 +4,17 @@ import numpy as np
 import pytest
 
 from lfstereo.training import samples
+from lfstereo.training.layers import Column
 from lfstereo.training.samples import (
     PUPIL_POINTS,
     SLICE_DISPARITIES,
     pair_sample,
     pupil_points,
-    shear_add,
     stack_sample,
 )
 from lfstereo.training.scenes import Scene, render
 from lfstereo.training.textures import texture_bank
-from lfstereo.training.tracing import Column
+from lfstereo.training.tracing import shear_add
 
 HEIGHT, WIDTH = 48, 96
 

@@ -2,6 +2,9 @@
 
 import dataclasses
 import math
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -10,20 +13,25 @@ import torch
 
 from lfstereo.cli.main import main
 from lfstereo.errors import AssetError, ConfigError
-from lfstereo.network.bdff_net import Architecture, BdffNet
+from lfstereo.network.bdff_net import Architecture, BdffNet, paper_architecture
+from lfstereo.network.focus_net import FocusNet
 from lfstereo.network.stereo_net import Prediction
 from lfstereo.network.weights import load_model
 from lfstereo.training.batches import PairBatches, PoolBatches, prefetched
-from lfstereo.training.checkpoint import read_weights
+from lfstereo.training.checkpoint import Counters, read_weights
+from lfstereo.training.curve import Curve, read_curve
 from lfstereo.training.evaluate import evaluate, held_out
 from lfstereo.training.evaluate import main as evaluate_main
 from lfstereo.training.loop import one_cycle, train
 from lfstereo.training.losses import bin_cross_entropy, image_loss, mean_absolute, staged_loss
+from lfstereo.training.planes import PlaneBatches
 from lfstereo.training.pool import Pool, fill_pool, open_pool
 from lfstereo.training.publish import main as publish_main
 from lfstereo.training.publish import measure, publish
 from lfstereo.training.recipe import Recipe, read_recipe
+from lfstereo.training.sources import Rings
 from lfstereo.training.stages import LOSSES, PARTS, TRAINED, select_parts
+from lfstereo.training.workers import join_workers
 
 SMALL = Architecture(focus_width=4, edof_width=4, tail_width=4, stereo_width=16)
 SIZE = {"height": 64, "width": 64, "textures": 4, "batch": 2, "threads": 1}
@@ -161,6 +169,8 @@ def test_all_shipped_recipes_can_be_read() -> None:
         recipe, architecture = read_recipe(path)
         assert recipe.stage in {"pool", *TRAINED}
         assert architecture == Architecture()
+    published = sorted((asset_folder("models") / "recipes" / "paper").glob("*.toml"))
+    assert [read_recipe(path)[1] for path in published] == [paper_architecture()] * 6
 
 
 def test_train_command_then_publish_then_evaluate(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -202,3 +212,98 @@ def test_evaluation_of_a_perfect_answer() -> None:
     assert rows["fused"].mae_px == pytest.approx(0.0, abs=1e-4)
     assert rows["fused"].bad == (0.0, 0.0, 0.0)
     assert rows["constant"].mae_px > 1
+
+
+def test_planes_hold_one_disparity_and_are_sharpest_there(pool: tuple[Path, Pool]) -> None:
+    source = PlaneBatches(pool[1], 1, 4, (32, 32))
+    batch, again = source(3), source(3)
+    assert torch.equal(batch.left_stack, again.left_stack)
+    assert batch.left_stack.shape == (4, 16, 3, 32, 32) and batch.disparity.shape == (4, 1, 32, 32)
+    for stack, disparity, sharp in zip(batch.left_stack, batch.disparity, batch.left, strict=True):
+        assert disparity.unique().numel() == 1
+        best = int((stack - sharp).abs().mean((1, 2, 3)).argmin())
+        assert abs(best / 15 - (1 - float(disparity[0, 0, 0]))) <= 1 / 15  # a slice; noise decides between the two nearest
+
+
+def test_planes_need_a_rendered_pool(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match="0 samples are rendered"):
+        PlaneBatches(open_pool(tmp_path, 2, 64, 64, 1), 1, 2, (32, 32))(0)
+
+
+def test_branches_start_blind_to_what_all_slices_share() -> None:
+    network = FocusNet(4)
+    flat = torch.rand(1, 1, 3, 32, 32).expand(-1, 16, -1, -1, -1)
+    for branch in network.branches:
+        first = branch.get_submodule("0.conv")
+        assert isinstance(first, torch.nn.Conv2d)
+        shared = torch.nn.functional.conv2d(flat.flatten(1, 2), first.weight, stride=first.stride)
+        assert float(shared.detach().abs().max()) < 1e-5
+
+
+def test_the_curve_is_kept_and_cut_where_a_run_is_resumed(tmp_path: Path) -> None:
+    curve = Curve(tmp_path / "curve.csv", 0)
+    for step in (20, 40, 60):
+        curve.add(Counters("edof", step, step / 10), 1e-3, 1 / step)
+    Curve(tmp_path / "curve.csv", 40).add(Counters("edof", 60, 7.0), 5e-4, 0.01)
+    rows = read_curve(tmp_path / "curve.csv")
+    assert [row[1] for row in rows] == [20, 40, 60]
+    assert rows[-1] == ("edof", 60, 7.0, 5e-4, 0.01)
+    assert Curve(tmp_path / "curve.csv", 0) and read_curve(tmp_path / "curve.csv") == []
+
+
+def test_checkpoints_come_in_small_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("lfstereo.training.checkpoint.SHARD_BYTES", 20_000)
+    train(Recipe(stage="stereo", steps=1, **SIZE), SMALL, tmp_path)
+    files = sorted((tmp_path / "checkpoint").glob("weights*.safetensors"))
+    largest = max(value.nbytes for value in read_weights(tmp_path).values())
+    assert len(files) > 3 and max(path.stat().st_size for path in files) < max(20_000, largest) + 10_000
+    assert train(Recipe(stage="stereo", steps=2, **SIZE), SMALL, tmp_path, resume=True).step == 2
+
+
+def test_several_recipes_build_on_each_other(
+    tmp_path: Path, pool: tuple[Path, Pool], capsys: pytest.CaptureFixture[str]
+) -> None:
+    base = "batch = 2\nheight = 64\nwidth = 64\ntextures = 4\npool_size = 3\nthreads = 1\nsteps = 2\n"
+    small = "[architecture]\nfocus_width = 4\nedof_width = 4\ntail_width = 4\nstereo_width = 16\n"
+    for stage in ("edof", "focus", "guided"):
+        (tmp_path / f"{stage}.toml").write_text(f'stage = "{stage}"\n{base}{small}')
+    recipes = [str(tmp_path / f"{stage}.toml") for stage in ("edof", "focus", "guided")]
+    words = ["train", *recipes, "--pool", str(pool[0]), "-o", str(tmp_path / "runs")]
+    assert main([*words, "--minutes", "1", "2"]) == 3
+    assert "expected 1 or 3" in capsys.readouterr().err
+    assert main([*words, "--minutes", "5"]) == 0
+    edof, guided = read_weights(tmp_path / "runs" / "edof"), read_weights(tmp_path / "runs" / "guided")
+    same = [name for name in edof if name.startswith("edof.")]
+    assert same and all(torch.equal(edof[name], guided[name]) for name in same)
+
+
+def test_a_ring_feeds_training_on_any_device(tmp_path: Path) -> None:
+    recipe = Recipe(
+        stage="edof", source="ring", ring=2, precision="bfloat16", steps=2, height=64, width=64, batch=2, textures=2
+    )
+    rings: Rings = {}
+    assert train(recipe, SMALL, tmp_path / "a", rings=rings).step == 2
+    (ring,) = rings.values()
+    train(dataclasses.replace(recipe, stage="focus"), SMALL, tmp_path / "b", rings=rings)
+    assert list(rings.values()) == [ring]
+
+
+def test_no_graphics_card(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(torch.cuda, "is_available", lambda: False)
+    with pytest.raises(ConfigError, match="--device cpu"), join_workers("cuda"):
+        pass
+
+
+def test_two_processes_train_one_network(tmp_path: Path) -> None:
+    """Under torchrun both see other batches, average their gradients and end with one checkpoint."""
+    text = 'stage = "stereo"\nsteps = 2\nbatch = 2\nheight = 64\nwidth = 64\ntextures = 2\nthreads = 1\n'
+    (tmp_path / "tiny.toml").write_text(text + "[architecture]\nstereo_width = 16\n")
+    launch = [sys.executable, "-m", "torch.distributed.run", "--standalone", "--nproc-per-node", "2", "-m", "lfstereo"]
+    words = ["train", str(tmp_path / "tiny.toml"), "-o", str(tmp_path / "run"), "--device", "cpu"]
+    environment = {**os.environ, "OMP_NUM_THREADS": "1"}
+    done = subprocess.run([*launch, *words], capture_output=True, text=True, env=environment)
+    assert done.returncode == 0, done.stderr
+    both = read_weights(tmp_path / "run")
+    train(read_recipe(tmp_path / "tiny.toml")[0], read_recipe(tmp_path / "tiny.toml")[1], tmp_path / "alone")
+    alone = read_weights(tmp_path / "alone")
+    assert any(not torch.equal(both[name], alone[name]) for name in both if name.startswith("stereo."))
