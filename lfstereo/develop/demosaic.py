@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 
 from lfstereo.arrays import Float32, Rgb
+from lfstereo.develop.demosaic_menon import menon2007
 from lfstereo.develop.options import DemosaicMethod
 
 _GREEN = np.array([[0, 0, -1, 0, 0], [0, 0, 2, 0, 0], [-1, 2, 4, 2, -1], [0, 0, 2, 0, 0], [0, 0, -1, 0, 0]]) / 8
@@ -69,11 +70,40 @@ def bilinear(mosaic: Float32, bayer: str) -> Rgb:
     return _by_filters(mosaic, bayer, cross, row, row.T, corners)
 
 
+def opencv_edge_aware(mosaic: Float32, bayer: str) -> Rgb:
+    """Interpolate along edges with OpenCV, on 16 bits; values below 0 become 0.
+
+    Parameters
+    ----------
+    mosaic
+        ``(H, W)`` float32, white balanced.
+    bayer
+        Colours of the top-left 2 x 2 sites row by row.
+
+    References
+    ----------
+    OpenCV, ``cv2.demosaicing`` with ``COLOR_Bayer*_EA``. Its names tell the sites from the second row and column on.
+
+    Examples
+    --------
+    >>> opencv_edge_aware(np.full((8, 8), 0.25, np.float32), "grbg")[4, 4].tolist()
+    [0.25, 0.25, 0.25]
+    """
+    peak = max(float(mosaic.max()), 1e-6)
+    codes = np.rint(np.maximum(mosaic, 0) * np.float32(65535 / peak)).astype(np.uint16)
+    code = getattr(cv2, f"COLOR_Bayer{_OPENCV[bayer]}2RGB_EA")
+    return np.asarray(cv2.demosaicing(codes, code).astype(np.float32) * np.float32(peak / 65535), np.float32)
+
+
+_OPENCV = {"rggb": "BG", "grbg": "GB", "bggr": "RG", "gbrg": "GR"}
+
 DEMOSAIC: dict[DemosaicMethod, Callable[[Float32, str], Rgb]] = {
     # Views are read from the micro-images' own samples; a picture of the whole mosaic is Malvar's.
     "micro-images": malvar2004,
     "malvar2004": malvar2004,
+    "menon2007": menon2007,
     "bilinear": bilinear,
+    "opencv-edge-aware": opencv_edge_aware,
 }
 
 

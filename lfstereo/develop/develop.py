@@ -10,12 +10,14 @@ from lfstereo.container.metadata import FrameMetadata
 from lfstereo.develop.colour import camera_matrix, grey_world_gains, to_linear, white_balance
 from lfstereo.develop.colour_spaces import conversion
 from lfstereo.develop.demosaic import DEMOSAIC
+from lfstereo.develop.demosaic_david import david2017
 from lfstereo.develop.highlights import lift_clipped
 from lfstereo.develop.hotpixels import repair_hot_pixels
 from lfstereo.develop.options import DevelopOptions
 from lfstereo.develop.shading import devignette
 from lfstereo.errors import ConfigError
 from lfstereo.lenslet.flatten import site_levels
+from lfstereo.lenslet.grid import LensletGrid
 
 
 def develop(
@@ -23,6 +25,7 @@ def develop(
     shading: Float32,
     options: DevelopOptions = DevelopOptions(),
     hot_pixels: UInt16 | None = None,
+    grid: LensletGrid | None = None,
 ) -> Rgb:
     """Develop a raw mosaic to a picture: :func:`develop_mosaic`, demosaic, :func:`output_matrix`.
 
@@ -30,6 +33,8 @@ def develop(
     ----------
     capture, shading, options, hot_pixels
         As for :func:`develop_mosaic`.
+    grid
+        The lenslet grid, which ``david2017`` alone needs.
 
     Returns
     -------
@@ -41,13 +46,19 @@ def develop(
     AssetError
         If the shading has another size.
     ConfigError
-        If the colour temperature cannot be, or a colour space is asked for without the colour matrix.
+        If the colour temperature cannot be, a colour space is asked for without the colour matrix, or a demosaic that
+        needs a grid has none.
     MetadataError
         If the colour matrix cannot be used, or there are none for a colour temperature.
     """
+    if options.demosaic == "david2017" and grid is None:
+        raise ConfigError("demosaic: found david2017 without a lenslet grid, expected one; choose another demosaic")
     matrix = output_matrix(capture.metadata, options)
     mosaic = develop_mosaic(capture, shading, options, hot_pixels)
-    return to_linear(DEMOSAIC[options.demosaic](mosaic, capture.metadata.bayer), matrix)
+    bayer = capture.metadata.bayer
+    if options.demosaic == "david2017" and grid is not None:
+        return to_linear(david2017(mosaic, bayer, shading, grid), matrix)
+    return to_linear(DEMOSAIC[options.demosaic](mosaic, bayer), matrix)
 
 
 def develop_mosaic(

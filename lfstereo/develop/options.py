@@ -11,7 +11,7 @@ Primaries = Literal["srgb", "display-p3", "prophoto"]
 """What the three numbers of linear light stand for."""
 ColourSpace = Literal["srgb", "linear", "display-p3", "prophoto"]
 """Primaries and transfer curve of a picture; ``linear`` has those of sRGB and no curve."""
-DemosaicMethod = Literal["micro-images", "malvar2004", "bilinear"]
+DemosaicMethod = Literal["micro-images", "david2017", "malvar2004", "menon2007", "bilinear", "opencv-edge-aware"]
 
 
 @dataclass(frozen=True, slots=True)

@@ -121,7 +121,7 @@ def views_from(
         mosaic = develop_mosaic(capture, shading, options.develop)
         read = read_micro_images(mosaic, shading, grid, offsets, capture.metadata.bayer, matrix)
     else:
-        read = LensletImage(develop(capture, shading, options.develop), grid.centres(), offsets)
+        read = LensletImage(develop(capture, shading, options.develop, grid=grid), grid.centres(), offsets)
     progress(30, 100)
     views, weight = sample_views(read, shading, grid, sampling, count, _part(progress, 30, 100))
     return LightField(

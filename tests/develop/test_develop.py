@@ -52,7 +52,8 @@ def test_demosaic_keeps_constants_and_ramps(method: str, bayer: str) -> None:
     y, x = np.mgrid[: SHAPE[0], : SHAPE[1]].astype(np.float32)
     ramps = np.stack([0.1 + 0.004 * x, 0.2 + 0.003 * y, 0.3 + 0.002 * x - 0.001 * y], axis=2)
     found = DEMOSAIC[method](mosaic_of(ramps, bayer), bayer)  # type: ignore[index]
-    assert np.abs(found - ramps)[4:-4, 4:-4].max() < 1e-5
+    # OpenCV rounds to 16 bits on the way: 2e-5 of the brightest.
+    assert np.abs(found - ramps)[4:-4, 4:-4].max() < (2e-5 if method == "opencv-edge-aware" else 1e-5)
 
 
 def test_malvar_beats_bilinear_on_a_grey_wave() -> None:
