@@ -6,10 +6,13 @@ import argparse
 import importlib
 import sys
 import traceback
-from collections.abc import Sequence
+import warnings
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import TextIO
 
 from lfstereo import __version__
-from lfstereo.errors import LfstereoError
+from lfstereo.errors import LfstereoError, QualityWarning
 
 COMMANDS: dict[str, tuple[str, str]] = {
     "info": (
@@ -21,8 +24,13 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "calibrate": ("lfstereo.cli.calibrate", "photographs of a calibration board by both cameras to a rig"),
     "rig": ("lfstereo.cli.rig", "a rig to and from the files of OpenCV, Kalibr and others"),
     "decode": ("lfstereo.cli.decode", "raw capture to 4-D light field"),
+    "whites": ("lfstereo.cli.whites", "the white images: import them, list them, check their grids"),
     "view-grid": ("lfstereo.cli.view_grid", "picture of a lenslet grid over its frame, and of what it leaves"),
     "export": ("lfstereo.cli.export", "light field or raw capture to the format of another program"),
+    "refocus": ("lfstereo.cli.refocus", "focal stack, or a picture focused at will, of one light field or of a pair"),
+    "filter": ("lfstereo.cli.filter", "light field with only what lies at one depth, or in a range of depths"),
+    "picture": ("lfstereo.cli.picture", "a perspective, an epipolar-plane image or a quilt of a light field"),
+    "animate": ("lfstereo.cli.animate", "focal sweep or parallax orbit of a light field as GIF or MP4"),
     "run": ("lfstereo.cli.run", "two captures to disparity, depth, all-in-focus image and point cloud"),
     "batch": ("lfstereo.cli.batch", "every stereo pair under a folder to depth, on many cores or a cluster"),
     "view": ("lfstereo.cli.view", "look at results and light fields in the browser, refocus them live"),
@@ -60,7 +68,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     words = list(sys.argv[1:] if argv is None else argv)
     arguments = build_parser(words).parse_args(words)
     try:
-        return int(importlib.import_module(COMMANDS[arguments.command][0]).run(arguments))
+        with _told_warnings(arguments.command):
+            return int(importlib.import_module(COMMANDS[arguments.command][0]).run(arguments))
     except LfstereoError as error:
         print(f"lfstereo {arguments.command}: {error}", file=sys.stderr)
         return error.exit_code
@@ -77,6 +86,30 @@ def main(argv: Sequence[str] | None = None) -> int:
             file=sys.stderr,
         )
         return 1
+
+
+@contextmanager
+def _told_warnings(command: str) -> Iterator[None]:
+    """Print the project's own warnings as one line each on stderr; all others go where they always go."""
+
+    def show(
+        message: Warning | str,
+        category: type[Warning],
+        filename: str,
+        lineno: int,
+        file: TextIO | None = None,
+        line: str | None = None,
+    ) -> None:
+        if issubclass(category, QualityWarning):
+            print(f"lfstereo {command}: warning: {message}", file=sys.stderr)
+        else:
+            others(message, category, filename, lineno, file, line)
+
+    with warnings.catch_warnings():
+        others = warnings.showwarning
+        warnings.simplefilter("always", QualityWarning)
+        warnings.showwarning = show
+        yield
 
 
 if __name__ == "__main__":

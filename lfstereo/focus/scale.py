@@ -10,7 +10,7 @@ import numpy as np
 
 from lfstereo.arrays import Float64
 from lfstereo.errors import ConfigError
-from lfstereo.rig.rectify import RectifiedGeometry
+from lfstereo.rig.geometry import RectifiedGeometry
 
 FocusUnit = Literal["slope", "disparity", "metres"]
 
