@@ -13,11 +13,10 @@ from lfstereo.arrays import Bool, Float32, Rgb
 from lfstereo.container import read_capture
 from lfstereo.conventions import SLICES_DEFAULT
 from lfstereo.depth.disparity import DisparityMap
-from lfstereo.errors import AssetError, ConfigError, ShapeError
+from lfstereo.errors import ConfigError, ShapeError
 from lfstereo.focus.refocus import render_stack, slice_disparities
 from lfstereo.focus.stack import FocalStack
-from lfstereo.lenslet.white import find_white_image
-from lfstereo.lightfield.decoding import decode
+from lfstereo.lightfield.calibration import decode_photograph
 from lfstereo.lightfield.field import LightField, in_srgb
 from lfstereo.lightfield.samples import ViewSamples, sample_views
 from lfstereo.lightfield.store import read_light_field
@@ -171,17 +170,15 @@ def match_pair(focused: FocusedPair, network: Network, clock: StageClock) -> Pai
 def open_light_field(path: Path, whites: Path | None, progress: Progress = silent) -> LightField:
     """Decode a raw capture, or read a light field that already is decoded.
 
-    Raises
-    ------
-    AssetError
-        If a raw capture is given without a folder of white images.
+    Warns
+    -----
+    QualityWarning
+        If a raw capture has no white image that fits, so that its grid is taken from the picture itself.
     """
     if path.is_dir() or path.suffix.lower() not in CAPTURE_SUFFIXES:
         return in_srgb(read_light_field(path))
     capture = read_capture(path)
-    if whites is None:
-        raise AssetError(f"{path}: a raw capture needs the camera's white images; give their folder with --whites")
-    return decode(capture, find_white_image(whites, capture.metadata), progress=progress)
+    return decode_photograph(capture, whites, progress=progress)
 
 
 def focus_side(

@@ -49,7 +49,7 @@ def test_decode_without_white_image_as_json(folder: Path, capsys: pytest.Capture
     assert summary["views"] == [9, 9, 24, 27, 3]
     assert summary["grid_from"] == "photograph"
     assert summary["pitch_px"] == pytest.approx(14.3, abs=0.01)
-    assert "estimated from the photograph" in printed.err
+    assert "estimated from the picture itself: 100% of its lenslets agree" in printed.err
     assert picture.exists()
     assert not (folder / "scene.png").exists()
 

@@ -18,19 +18,24 @@ from lfstereo.progress import StageClock
 
 if TYPE_CHECKING:
     from lfstereo.container.capture import Capture
-    from lfstereo.lenslet.grid import LensletGrid
+    from lfstereo.lightfield.calibration import LensletCalibration
     from lfstereo.lightfield.field import LightField
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument("capture", type=Path, help="LFR, LFP, RAW or DNG capture, or with --camera an image of its mosaic")
-    parser.add_argument("--whites", type=Path, help="folder with the camera's white images, or one white image")
+    parser.add_argument(
+        "capture", type=Path, help="LFR, LFP, RAW or DNG capture, or with --camera an image of its mosaic"
+    )
+    parser.add_argument(
+        "--whites", type=Path, help="folder or archive of white images, or one (default: those imported)"
+    )
     parser.add_argument("--camera", help="camera of a mosaic stored as an image: lytro-f01 or lytro-illum")
     parser.add_argument(
         "-o", "--output", type=Path, required=True, help="light field to write (.h5, or .mat for MATLAB)"
     )
     parser.add_argument("--preview", type=Path, help="picture of the views and the grid (default: beside the output)")
+    parser.add_argument("--report", action="store_true", help="add a map of what the grid leaves to that picture")
     parser.add_argument("--config", type=Path, help="TOML file with options; the command line goes before it")
     parser.add_argument("--force", action="store_true", help="replace an output that exists")
     parser.add_argument("--json", action="store_true", help="print the summary as JSON on stdout")
@@ -49,29 +54,24 @@ def run(arguments: argparse.Namespace) -> int:
     check_absent(preview, arguments.force)
     options = _options(arguments)
 
-    from lfstereo.lightfield.decoding import calibrate, check_method, views_from
+    from lfstereo.lightfield.calibration import calibrate_photograph, decode_with
     from lfstereo.lightfield.interchange.formats import export_light_field
     from lfstereo.lightfield.interchange.lftoolbox_mat import SUFFIX as MAT_SUFFIX
-    from lfstereo.lightfield.lftoolbox import decode_as_lftoolbox
     from lfstereo.lightfield.store import check_suffix
 
     if arguments.output.suffix.lower() != MAT_SUFFIX:
         check_suffix(arguments.output)
     clock = StageClock(bars=sys.stderr.isatty() or not arguments.json)
     with clock.stage("read"):
-        capture, white = _read(arguments)
-    check_method(options, white)
+        capture = _read(arguments)
     with clock.stage("lenslet grid") as progress:
-        grid, shading = calibrate(capture, white, options.grid, progress)
+        found = calibrate_photograph(capture, arguments.whites, options.grid, progress)
     with clock.stage("views") as progress:
-        if options.method == "lftoolbox" and white is not None:
-            light_field = decode_as_lftoolbox(capture, white, grid, progress)
-        else:
-            light_field = views_from(capture, grid, shading, options, progress)
+        light_field = decode_with(capture, found, options, progress)
     with clock.stage("write"):
         export_light_field(arguments.output, light_field, force=arguments.force)
-        _write_preview(preview, light_field, white or capture, grid, arguments.force)
-    summary = _summary(light_field, grid, clock)
+        _write_preview(preview, light_field, capture, found, arguments)
+    summary = _summary(light_field, found, clock)
     print(json.dumps(summary, indent=2) if arguments.json else _text(summary, arguments.output, preview))
     return 0
 
@@ -92,35 +92,38 @@ def _options(arguments: argparse.Namespace) -> DecodeOptions:
     )
 
 
-def _read(arguments: argparse.Namespace) -> tuple[Capture, Capture | None]:
+def _read(arguments: argparse.Namespace) -> Capture:
     from lfstereo.container.capture import read_capture
     from lfstereo.container.mosaic_image import read_mosaic_image
-    from lfstereo.lenslet.white import find_white_image
 
     if arguments.camera:
-        capture = read_mosaic_image(arguments.capture, arguments.camera)
-    else:
-        capture = read_capture(arguments.capture)
-    if arguments.whites is None:
-        print("no --whites given: lenslet grid and vignetting are estimated from the photograph", file=sys.stderr)
-        return capture, None
-    return capture, find_white_image(arguments.whites, capture.metadata)
+        return read_mosaic_image(arguments.capture, arguments.camera)
+    return read_capture(arguments.capture)
 
 
-def _write_preview(path: Path, light_field: LightField, framed: Capture, grid: LensletGrid, force: bool) -> None:
+def _write_preview(
+    path: Path, light_field: LightField, capture: Capture, found: LensletCalibration, arguments: argparse.Namespace
+) -> None:
     import cv2
+    import numpy as np
 
     from lfstereo.lenslet.overlay import draw_grid
+    from lfstereo.lenslet.residual import draw_residual, measure_residual
     from lfstereo.lightfield.field import in_srgb
     from lfstereo.lightfield.views import montage
 
-    picture = montage(in_srgb(light_field), draw_grid(framed, grid))
-    encoded = cv2.imencode(".png", picture[..., ::-1])[1]
-    with atomic_file(path, force) as scratch:
+    framed, grid = (capture, found.grid) if found.white is None else (found.white, found.white_grid or found.grid)
+    below = draw_grid(framed, grid)
+    if arguments.report:
+        residual = draw_residual(measure_residual(framed, grid), grid, below.shape[1])
+        below = np.concatenate([below, residual], axis=0)
+    encoded = cv2.imencode(".png", montage(in_srgb(light_field), below)[..., ::-1])[1]
+    with atomic_file(path, arguments.force) as scratch:
         scratch.write_bytes(encoded.tobytes())
 
 
-def _summary(light_field: LightField, grid: LensletGrid, clock: StageClock) -> dict[str, Any]:
+def _summary(light_field: LightField, found: LensletCalibration, clock: StageClock) -> dict[str, Any]:
+    grid = found.grid
     return {
         "views": list(light_field.views.shape),
         "grid_from": grid.source,
@@ -128,6 +131,10 @@ def _summary(light_field: LightField, grid: LensletGrid, clock: StageClock) -> d
         "pitch_px": (grid.step_u_px[0] ** 2 + grid.step_u_px[1] ** 2) ** 0.5,
         "grid_residual_px": grid.residual_px,
         "grid_quality": grid.quality,
+        "grid_uncertainty_px": grid.uncertainty_px,
+        "grid_offset_px": found.offset_px,
+        "white_image": found.white.source if found.white else None,
+        "hot_pixels": 0 if found.hot_pixels is None else len(found.hot_pixels),
         "seconds": clock.seconds,
         "peak_memory_gib": max(clock.peak_gib.values()),
     }
@@ -135,12 +142,14 @@ def _summary(light_field: LightField, grid: LensletGrid, clock: StageClock) -> d
 
 def _text(summary: dict[str, Any], output: Path, preview: Path) -> str:
     rows, columns = summary["lenslets"]
+    off_px = summary["grid_offset_px"]
+    offset = "" if off_px is None else f", {off_px:.3f} px off the capture's own micro-images"
     times = ", ".join(f"{name} {seconds:.1f} s" for name, seconds in summary["seconds"].items())
     return "\n".join(
         [
             "views {} x {} of {} x {} px".format(*(summary["views"][k] for k in (0, 1, 3, 2))),
             f"grid from the {summary['grid_from']}: {rows} x {columns} lenslets, pitch {summary['pitch_px']:.4f} px, "
-            f"residual {summary['grid_residual_px']:.3f} px, {summary['grid_quality']:.1%} agree",
+            f"residual {summary['grid_residual_px']:.3f} px, {summary['grid_quality']:.1%} agree" + offset,
             f"{times}; peak memory {summary['peak_memory_gib']:.2f} GiB",
             f"light field: {output} (look first at {preview})",
         ]

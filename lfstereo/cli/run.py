@@ -22,7 +22,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("left", type=Path, help="left capture: LFR/LFP/RAW, .h5 light field or folder of views")
     parser.add_argument("right", type=Path, help="right capture, likewise")
     parser.add_argument("--rig", type=Path, required=True, help="rig file of the two cameras")
-    parser.add_argument("--whites", type=Path, help="folder with the cameras' white images; needed for raw captures")
+    parser.add_argument("--whites", type=Path, help="folder or archive of white images (default: those imported)")
     parser.add_argument("-o", "--output", type=Path, required=True, help="folder for the results")
     parser.add_argument("--truth", type=Path, help="folder with a true disparity.pfm to report the error against")
     parser.add_argument("--config", type=Path, help="TOML file with options; the command line goes before it")

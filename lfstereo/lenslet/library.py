@@ -30,7 +30,7 @@ from lfstereo.lenslet.home import remembered
 
 _CAMERA_NAME_PART = "MOD_"
 """Part of the file name that the cameras give their white images."""
-_LAYOUT = 1
+_LAYOUT = 2
 """To be raised when the stored index changes its form."""
 
 
@@ -52,6 +52,10 @@ class WhiteImage:
     """The camera's list of bad pixels."""
     factory: Member | None = None
     """The camera's table of factory lattices."""
+    unit_info: Member | None = None
+    """The file that states the camera's serial number."""
+    manifest: Member | None = None
+    """The file that gives the references."""
 
     def read(self) -> Capture:
         """Read the frame.
@@ -177,6 +181,8 @@ def _index(place: Path) -> WhiteLibrary:
                 references=tuple(sorted(r for r, stem in named.items() if stem.upper() == path.stem.upper())),
                 hot_pixels=_nearest(hot, path),
                 factory=_nearest(factory, path),
+                unit_info=info,
+                manifest=manifest,
             )
         except InputError as error:
             problems.append(str(error))
@@ -218,7 +224,7 @@ def _from_json(stored: dict[str, Any], place: Path) -> WhiteLibrary:
         return None if values is None else Member(**values | {"file": Path(values["file"])})
 
     build: Callable[..., WhiteImage] = WhiteImage
-    parts = ("raw", "text", "hot_pixels", "factory")
+    parts = ("raw", "text", "hot_pixels", "factory", "unit_info", "manifest")
     whites = tuple(
         build(**w | {name: member(w[name]) for name in parts} | {"references": tuple(w["references"])})
         for w in stored["whites"]

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from lfstereo.arrays import Float32
+from lfstereo.arrays import Float32, UInt16
 from lfstereo.container.capture import Capture
 from lfstereo.develop.develop import develop, develop_mosaic, output_matrix
 from lfstereo.develop.shading import shading_from_photograph, shading_from_white_image
 from lfstereo.errors import AssetError, ConfigError
-from lfstereo.lenslet.fit import estimate_grid_from_photograph, fit_grid
+from lfstereo.lenslet.fit import estimate_grid_from_photograph
 from lfstereo.lenslet.grid import LensletGrid
 from lfstereo.lenslet.options import GridOptions
+from lfstereo.lenslet.remembered_grid import remembered_grid
 from lfstereo.lightfield.field import LightField
 from lfstereo.lightfield.lftoolbox import decode_as_lftoolbox
 from lfstereo.lightfield.micro_images import read_micro_images
@@ -61,11 +62,11 @@ def decode(
         If the colour matrix cannot be used.
     """
     check_method(options, white)
-    grid, shading = calibrate(capture, white, options.grid, _part(progress, 0, 25))
+    grid, shading = calibrate(capture, white, options.grid, part_of(progress, 0, 25))
     if options.method == "lftoolbox" and white is not None:
         del shading
-        return decode_as_lftoolbox(capture, white, grid, _part(progress, 25, 100))
-    return views_from(capture, grid, shading, options, _part(progress, 25, 100))
+        return decode_as_lftoolbox(capture, white, grid, part_of(progress, 25, 100))
+    return views_from(capture, grid, shading, options, part_of(progress, 25, 100))
 
 
 def check_method(options: DecodeOptions, white: Capture | None) -> None:
@@ -96,6 +97,7 @@ def views_from(
     shading: Float32,
     options: DecodeOptions = DecodeOptions(),
     progress: Progress = silent,
+    hot_pixels: UInt16 | None = None,
 ) -> LightField:
     """Develop a capture and read its views, with a known grid and illumination; as in :func:`decode`.
 
@@ -111,6 +113,8 @@ def views_from(
         Number and distance of the views, and how the mosaic is developed.
     progress
         Told of the work done, in hundredths.
+    hot_pixels
+        ``(N, 2)`` (x, y) pixels that are known to be bad.
     """
     count = view_count(grid, options.view)
     sampling = view_sampling(grid, options.view.view_step_px)
@@ -118,12 +122,13 @@ def views_from(
     read: LensletReader
     if options.develop.demosaic == "micro-images":
         matrix = output_matrix(capture.metadata, options.develop)
-        mosaic = develop_mosaic(capture, shading, options.develop)
+        mosaic = develop_mosaic(capture, shading, options.develop, hot_pixels)
         read = read_micro_images(mosaic, shading, grid, offsets, capture.metadata.bayer, matrix)
     else:
-        read = LensletImage(develop(capture, shading, options.develop, grid=grid), grid.centres(), offsets)
+        picture = develop(capture, shading, options.develop, hot_pixels, grid)
+        read = LensletImage(picture, grid.centres(), offsets)
     progress(30, 100)
-    views, weight = sample_views(read, shading, grid, sampling, count, _part(progress, 30, 100))
+    views, weight = sample_views(read, shading, grid, sampling, count, part_of(progress, 30, 100))
     return LightField(
         views=views,
         weight=weight,
@@ -152,7 +157,7 @@ def calibrate(
         grid = estimate_grid_from_photograph(capture, options, progress)
         return grid, shading_from_photograph(capture, grid)
     _refuse_other_camera(capture, white)
-    return fit_grid(white, options, progress), shading_from_white_image(white)
+    return remembered_grid(white, options, progress), shading_from_white_image(white)
 
 
 def view_count(grid: LensletGrid, options: ViewOptions) -> int:
@@ -189,7 +194,9 @@ def _refuse_other_camera(capture: Capture, white: Capture) -> None:
         )
 
 
-def _part(progress: Progress, start: int, stop: int) -> Progress:
+def part_of(progress: Progress, start: int, stop: int) -> Progress:
+    """Return a progress callback whose whole is a part of another's, from ``start`` to ``stop`` hundredths."""
+
     def report(done: int, total: int) -> None:
         progress(start + (stop - start) * done // max(total, 1), 100)
 
