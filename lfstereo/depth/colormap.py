@@ -30,6 +30,8 @@ class DisparityScale:
     """Focal length of the rectified views; without it, or without a baseline, the scale shows px alone."""
     baseline_m: float | None = None
     doffs_px: float = 0.0
+    unit: str = "px"
+    """Heading of the scale, for maps of something else than disparity."""
 
     def __post_init__(self) -> None:
         if not (np.isfinite([self.near_px, self.far_px]).all() and self.near_px > self.far_px):
@@ -136,7 +138,7 @@ def _legend(rows: int, scale: DisparityScale) -> UInt8:
     left, right = _GAP * n, (_GAP + _BAR_WIDTH) * n
     canvas[top * n : bottom * n, left:right] = _turbo(share)[:, None]
     metric = scale.focal_px is not None and scale.baseline_m is not None
-    _write(canvas, "px", _GAP + _BAR_WIDTH + 10, 15, _FAINT)
+    _write(canvas, scale.unit, _GAP + _BAR_WIDTH + 10, 15, _FAINT)
     if metric:
         _write(canvas, "m", _GAP + _BAR_WIDTH + 48, 15, _FAINT)
     for tick in round_ticks(scale.far_px, scale.near_px, max(2, min(11, (bottom - top) // 34))):

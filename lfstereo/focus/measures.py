@@ -40,7 +40,7 @@ class FocusOptions:
     )
     blur_px: float = option(1.0, "Gaussian blur before the measure, against noise; 0: none", "px")
     window_px: int = option(9, "side of the window in which sharpness is summed, odd", "px")
-    radius_px: int = option(16, "how far hosni2013 and min2014 ask neighbours; 0: not at all", "px")
+    radius_px: int = option(16, "how far all but nayar1992 ask neighbours; 0: not at all", "px")
     edge_share: float = option(0.03, "change of brightness, of white, across which neighbours are not asked")
     tv_strength: float = option(0.1, "moeller2015: cost of an edge of one slice, per px of its length")
     iterations: int = option(200, "moeller2015: steps of the descent")
@@ -107,7 +107,8 @@ def find_focus(slices: Float32, options: FocusOptions = FocusOptions()) -> Focus
     The sum-modified Laplacian of the logarithm of luminance is averaged over a window. ``nayar1992`` fits a Gaussian to
     the three values around its largest. ``hosni2013`` and ``min2014`` first take it as a share of the pixel's largest
     and average it over neighbours of like colour; the picture whose edges they keep is the all-in-focus one that the
-    measure gives by itself. ``moeller2015`` asks for the sharpest slices that change little from pixel to pixel.
+    measure gives by itself. ``moeller2015`` begins with
+    what ``min2014`` finds and asks for the sharpest slices that change little from pixel to pixel.
 
     Parameters
     ----------
@@ -145,15 +146,15 @@ def blend_slices(slices: Float32, slice_index: Float32) -> Rgb:
 
 
 def _peak(sharpness: Float32, slices: Float32, options: FocusOptions) -> Float32:
-    if options.method == "moeller2015" and len(slices) > 2:
-        return variational_peak(sharpness, options.tv_strength, options.iterations)
     index = gaussian_peak(sharpness)
-    if options.method == "nayar1992" or options.radius_px == 0:
-        return index
-    shares = sharpness / np.maximum(sharpness.max(axis=0), TINY)
-    guide = blend_slices(slices, index)
-    smooth = guided_volume if options.method == "hosni2013" else globally_smoothed_volume
-    return gaussian_peak(smooth(shares, guide, options.radius_px, options.edge_share))
+    if options.method != "nayar1992" and options.radius_px > 0:
+        shares = sharpness / np.maximum(sharpness.max(axis=0), TINY)
+        guide = blend_slices(slices, index)
+        smooth = guided_volume if options.method == "hosni2013" else globally_smoothed_volume
+        index = gaussian_peak(smooth(shares, guide, options.radius_px, options.edge_share))
+    if options.method == "moeller2015" and len(slices) > 2:
+        index = variational_peak(sharpness, index, options.tv_strength, options.iterations)
+    return index
 
 
 def _confidence(sharpness: Float32) -> Float32:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import cv2
 import numba
 import numpy as np
 
@@ -12,24 +11,23 @@ from lfstereo.focus.shift_kernels import compiled
 
 DEGREE = 8
 """Of the polynomial that stands for a pixel's curve of sharpness, as in the paper."""
-_START_PX = 9
-"""Side of the window in which the start is the sharpest."""
 _DUAL_STEP = 0.5
 """In slices squared: how fast the two sides of the saddle point move; any value converges."""
 
 
-def variational_peak(sharpness: Float32, strength: float, iterations: int) -> Float32:
+def variational_peak(sharpness: Float32, start: Float32, strength: float, iterations: int) -> Float32:
     """Return the slice in focus, between slices fractional, that minimises ``-sum c_p(d_p) + strength * TV(d)``.
 
     ``c_p`` is the polynomial of degree 8 through the sharpness of pixel p over the slices, in units of the picture's
     mean peak; ``TV`` the sum over the pixels of the length of the gradient of d, in slices per px. The first term has
-    many valleys; a local minimum is found by linearising it at every step, beginning with the sharpest slices of a
-    blurred volume.
+    many valleys; the local minimum below the start is found by linearising it at every step.
 
     Parameters
     ----------
     sharpness
-        ``(K, V, U)``, measured pixel by pixel, three slices or more.
+        ``(K, V, U)``, three slices or more.
+    start
+        ``(V, U)`` slices in focus as far as they are known.
     strength
         How much an edge of one slice in depth costs per px of its length.
     iterations
@@ -47,7 +45,7 @@ def variational_peak(sharpness: Float32, strength: float, iterations: int) -> Fl
 
     >>> k = np.arange(5, dtype=np.float32)[:, None, None]
     >>> peak = np.full((1, 2, 4), 2.0); peak[0, 1, 2] = 3.0
-    >>> found = variational_peak(np.exp(-((k - peak) ** 2) / 4).astype(np.float32), 1.0, 300)
+    >>> found = variational_peak(np.exp(-((k - peak) ** 2) / 4).astype(np.float32), np.float32(peak[0]), 1.0, 300)
     >>> float(np.abs(found - found.mean()).max()) < 0.01
     True
     """
@@ -65,8 +63,7 @@ def variational_peak(sharpness: Float32, strength: float, iterations: int) -> Fl
         axes=1,
     )
     reach = np.abs(bend).max(axis=0)
-    start = np.stack([cv2.blur(slice_, (_START_PX, _START_PX)) for slice_ in sharpness]).argmax(axis=0)
-    index: Float32 = start.astype(np.float32)
+    index = np.array(start, np.float32)
     _descend(index, np.ascontiguousarray(np.moveaxis(slope, 0, -1)), reach, per_x, np.float32(strength), iterations)
     return index
 
