@@ -12,11 +12,13 @@ and its wall time beside that of a plain copy of as many bytes.
 
 from __future__ import annotations
 
+import resource
 import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 from unittest import mock
@@ -86,17 +88,17 @@ METHODS: dict[str, Callable[[KnownFrame], LightField]] = {
 }
 
 
-def psnr_by_ring(frame: KnownFrame, field: LightField) -> list[float]:
+def psnr_by_ring(frame: KnownFrame, light_field: LightField) -> list[float]:
     """Return the PSNR of the centre view and of the rings of views around it."""
     inner = (slice(BORDER, -BORDER), slice(BORDER, -BORDER))
-    t0, s0 = field.centre
-    shown, found = frame.view(field, t0, s0)[inner], field.views[t0, s0][inner]
+    t0, s0 = light_field.centre
+    shown, found = frame.view(light_field, t0, s0)[inner], light_field.views[t0, s0][inner]
     gain = (shown * found).sum((0, 1)) / (found * found).sum((0, 1))
     squares: list[list[float]] = [[] for _ in RINGS[1:]]
-    for t, s in np.ndindex(*field.views.shape[:2]):
+    for t, s in np.ndindex(*light_field.views.shape[:2]):
         ring = int(np.searchsorted(RINGS, np.hypot(t - t0, s - s0), side="right")) - 1
         if ring < len(squares):
-            error = field.views[t, s][inner] * gain - frame.view(field, t, s)[inner]
+            error = light_field.views[t, s][inner] * gain - frame.view(light_field, t, s)[inner]
             squares[ring].append(float(np.mean(error**2)))
     return [-10 * float(np.log10(np.mean(ring))) for ring in squares]
 
@@ -116,18 +118,31 @@ def quality() -> None:
             print(f"  slope {slope:<5g}{'gained':<18}" + "".join(f"{value:+7.1f}" for value in gained))
 
 
-@contextmanager
-def stage(name: str, megabytes: float) -> Iterator[None]:
-    """Print the time of a stage and of a copy of as many bytes."""
-    wall, cpu = time.perf_counter(), time.process_time()
-    yield
-    wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
-    source = np.ones(int(megabytes * 1e6 / 2), np.uint8)
-    target = np.ones_like(source)
-    copy = time.perf_counter()
-    np.copyto(target, source)
-    copy = time.perf_counter() - copy
-    print(f"{name:<44}{wall:7.2f}{cpu:7.2f}{megabytes:9.0f}{wall / copy:9.0f}")
+@dataclass
+class Clock:
+    """Times stages, and afterwards copies of as many bytes."""
+
+    rows: list[tuple[str, float, float, float]] = field(default_factory=list)
+
+    @contextmanager
+    def stage(self, name: str, megabytes: float) -> Iterator[None]:
+        """Time one stage that reads and writes so many bytes."""
+        wall, cpu = time.perf_counter(), time.process_time()
+        yield
+        self.rows.append((name, time.perf_counter() - wall, time.process_time() - cpu, megabytes))
+
+    def print(self) -> None:
+        """Print the stages, the decode as their sum without the last one, and the ratios to copies."""
+        print(f"\n{'stage':<48}{'wall s':>7}{'CPU s':>7}{'MB moved':>9}{'/ copy':>9}")
+        for name, wall, cpu, megabytes in self.rows:
+            source = np.ones(int(megabytes * 1e6 / 2), np.uint8)
+            target = np.ones_like(source)
+            copy = time.perf_counter()
+            np.copyto(target, source)
+            copy = time.perf_counter() - copy
+            print(f"{name:<48}{wall:7.2f}{cpu:7.2f}{megabytes:9.0f}{wall / copy:9.0f}")
+        walls, cpus = (sum(row[k] for row in self.rows[:-1]) for k in (1, 2))
+        print(f"{'decode, all but the last':<48}{walls:7.2f}{cpus:7.2f}")
 
 
 def speed() -> None:
@@ -143,37 +158,35 @@ def speed() -> None:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "frame.LFR"
         write_capture(path, white)
-        for _ in range(2):
-            print(f"\n{'stage':<44}{'wall s':>7}{'CPU s':>7}{'MB moved':>9}{'/ copy':>9}")
-            decode_in_stages(path, grid, Path(folder) / "field.h5")
-    import resource
+        clocks = [Clock(), Clock()]
+        for clock in clocks:
+            decode_in_stages(path, grid, Path(folder) / "field.h5", clock)
+        peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
+        for clock in clocks:
+            clock.print()
+    print(f"peak memory {peak:.2f} GiB")
 
-    print(f"peak memory {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20:.2f} GiB")
 
-
-def decode_in_stages(path: Path, grid: Any, target: Path) -> None:
+def decode_in_stages(path: Path, grid: Any, target: Path, clock: Clock) -> None:
     """Decode one frame that serves as its own white image, and print each stage."""
-    started, started_cpu = time.perf_counter(), time.process_time()
-    with stage("read and unpack the photograph", 52 + 83):
+    with clock.stage("read and unpack the photograph", 52 + 83):
         capture = read_capture(path)
-    with stage("read and unpack the white image", 52 + 83):
+    with clock.stage("read and unpack the white image", 52 + 83):
         white = read_capture(path)
-    with stage("illumination from the white image", 83 + 166):
+    with clock.stage("illumination from the white image", 83 + 166):
         shading = shading_from_white_image(white)
-    with stage("levels, devignetting, hot pixels, white, clips", 83 + 2 * 166 + 166):
+    with clock.stage("levels, devignetting, hot pixels, white, clips", 83 + 2 * 166 + 166):
         mosaic = develop_mosaic(capture, shading)
     sampling = view_sampling(grid, DecodeOptions().view.view_step_px)
     offsets = offsets_inside(grid, sampling, 15)
-    with stage("operators", 256 * 157 * len(offsets) * 3 * 4 / 1e6):
+    with clock.stage("operators", 256 * 157 * len(offsets) * 3 * 4 / 1e6):
         read = read_micro_images(
             mosaic, shading, grid, offsets, capture.metadata.bayer, output_matrix(capture.metadata)
         )
-    with stage("views and weights", 2 * 166 + 15 * 15 * 434 * 625 * 13 / 1e6):
+    with clock.stage("views and weights", 2 * 166 + 15 * 15 * 434 * 625 * 13 / 1e6):
         views, weight = sample_views(read, shading, grid, sampling, 15)
-    wall, cpu = time.perf_counter() - started, time.process_time() - started_cpu
-    print(f"{'decode':<44}{wall:7.2f}{cpu:7.2f}   with the copies between")
     del mosaic, read
-    with stage("write HDF5", 15 * 15 * 434 * 625 * (13 + 7) / 1e6):
+    with clock.stage("write HDF5", 15 * 15 * 434 * 625 * (13 + 7) / 1e6):
         write_light_field(target, LightField(views, weight, sampling, "", "benchmark"), force=True)
 
 

@@ -117,8 +117,9 @@ def unpack(data: bytes | memoryview, width: int, height: int, bits: int, endiann
         return raw.view(_DTYPE_16[endianness]).reshape(height, width).astype(np.uint16)
     group_bytes, group_pixels = PACKINGS[bits, endianness]
     groups, pixels = raw.reshape(-1, group_bytes), np.empty((raw.size // group_bytes, group_pixels), np.uint16)
-    for block in _blocks(len(groups)):
-        (_unpack_10 if bits == 10 else _unpack_12)(groups[block].astype(np.uint16), pixels[block])
+    from lfstereo.container.unpack_kernels import unpack_10, unpack_12
+
+    (unpack_10 if bits == 10 else unpack_12)(groups, pixels)
     return pixels.reshape(height, width)
 
 
@@ -177,17 +178,6 @@ _DTYPE_16 = {"little": np.dtype("<u2"), "big": np.dtype(">u2")}
 
 def _blocks(groups: int) -> Iterator[slice]:
     return (slice(start, start + _GROUPS_AT_ONCE) for start in range(0, groups, _GROUPS_AT_ONCE))
-
-
-def _unpack_10(groups: npt.NDArray[np.uint16], pixels: npt.NDArray[np.uint16]) -> None:
-    low = groups[:, 4]
-    for i in range(4):
-        pixels[:, i] = groups[:, i] << 2 | (low >> (2 * i) & 3)
-
-
-def _unpack_12(groups: npt.NDArray[np.uint16], pixels: npt.NDArray[np.uint16]) -> None:
-    pixels[:, 0] = groups[:, 0] << 4 | groups[:, 1] >> 4
-    pixels[:, 1] = (groups[:, 1] & 15) << 8 | groups[:, 2]
 
 
 def _pack_10(pixels: npt.NDArray[np.uint16], groups: UInt8) -> None:

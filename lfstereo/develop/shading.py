@@ -6,7 +6,7 @@ import cv2
 import numba
 import numpy as np
 
-from lfstereo.arrays import Float32, Float64, check_shape
+from lfstereo.arrays import Float32, Float64, Mosaic, check_shape
 from lfstereo.container.capture import Capture
 from lfstereo.errors import AssetError
 from lfstereo.lenslet.flatten import flatten, site_levels
@@ -34,16 +34,21 @@ def shading_from_white_image(white: Capture) -> Float32:
     ``(H, W)`` float32, 1 = full light (the 99.5th percentile), 0 = none; may exceed 1 a little.
     """
     meta = white.metadata
-    black = site_levels(meta.black, meta.bayer)
-    shading = np.empty(white.mosaic.shape, np.float32)
+    black = np.array(site_levels(meta.black, meta.bayer), np.float32)
+    scale = np.empty((2, 2), np.float32)
     for y in (0, 1):
         for x in (0, 1):
-            plane = white.mosaic[y::2, x::2].astype(np.float32)
-            plane -= np.float32(black[y][x])
-            smooth = cv2.blur(plane, (3, 3))[::_SAMPLE_STRIDE, ::_SAMPLE_STRIDE]
-            full = float(np.percentile(smooth, _FULL_LIGHT_PERCENTILE))
-            shading[y::2, x::2] = plane / np.float32(max(full, 1.0))
-    return np.maximum(shading, 0, out=shading)
+            plane = white.mosaic[y::2, x::2]
+            smooth = np.zeros(plane[1:-1:_SAMPLE_STRIDE, 1:-1:_SAMPLE_STRIDE].shape, np.float32)
+            for row in range(3):
+                for column in range(3):
+                    last = (row - 2 or None, column - 2 or None)
+                    smooth += plane[row : last[0] : _SAMPLE_STRIDE, column : last[1] : _SAMPLE_STRIDE]
+            full = float(np.percentile(smooth / 9, _FULL_LIGHT_PERCENTILE)) - float(black[y, x])
+            scale[y, x] = 1 / max(full, 1.0)
+    shading: Float32 = np.empty(white.mosaic.shape, np.float32)
+    _scale_sites(white.mosaic, black, scale, shading)
+    return shading
 
 
 def shading_from_photograph(photograph: Capture, grid: LensletGrid) -> Float32:
@@ -98,6 +103,15 @@ def devignette(mosaic: Float32, shading: Float32, floor: float) -> Float32:
         )
     check_shape("mosaic", mosaic, (None, None))
     return np.asarray(cv2.divide(mosaic, cv2.max(shading, float(floor)), dst=mosaic), np.float32)
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _scale_sites(mosaic: Mosaic, black: Float32, scale: Float32, out: Float32) -> None:  # pragma: no cover
+    """Fill ``out`` with the light above black, in each site's own unit, not below 0."""
+    for y in range(mosaic.shape[0]):
+        for x in range(mosaic.shape[1]):
+            light = (np.float32(mosaic[y, x]) - black[y & 1, x & 1]) * scale[y & 1, x & 1]
+            out[y, x] = max(light, np.float32(0.0))
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]

@@ -55,27 +55,32 @@ class MicroImages:
     operators: dict[int, Operator]
     """By phase."""
 
-    def __call__(self, start: int, stop: int) -> tuple[Float32, Index]:
-        """Return the views' colours at the lenslets of some rows of the grid.
+    def __call__(self, start: int, stop: int, values: Float32) -> Index:
+        """Read the views' colours at the lenslets of some rows of the grid.
+
+        Parameters
+        ----------
+        start, stop
+            The rows.
+        values
+            Filled with ``(lenslets, 3 N)``, colours running fastest, in an order of their own.
 
         Returns
         -------
-        ``(lenslets, 3 N)`` float32 values, colours running fastest, and the ``(rows, columns)`` places of the
-        lenslets among them.
+        ``(rows, columns)`` places of the lenslets among the values.
         """
         cells, phases = _cells(self.centres[start:stop])
         order = np.argsort(phases, kind="stable")
         edges = np.searchsorted(phases[order], np.arange(PHASES**2 + 1))
         places = np.empty(len(order), np.int32)
         places[order] = np.arange(len(order), dtype=np.int32)
-        values: Float32 = np.empty((len(order), next(iter(self.operators.values())).weights.shape[1]), np.float32)
         for phase in np.flatnonzero(np.diff(edges)):
             operator = self.operators[int(phase)]
             members = order[edges[phase] : edges[phase + 1]]
             patches = np.empty((members.size, len(operator.pixels)), np.float32)
             _gather(self.mosaic, self.shading, cells[members], operator.pixels, operator.inner, patches)
             np.matmul(patches, operator.weights, out=values[edges[phase] : edges[phase + 1]])
-        return values, places.reshape(stop - start, -1)
+        return places.reshape(stop - start, -1)
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,17 +169,14 @@ def micro_image_operator(
     lit = np.maximum(ndtr((0.49 * pitch_px - radius) / _SPOT_PX), 0.05)
     system, common = _covariances(pixels, colours, offsets + centre, _covariance_table())
     system[np.diag_indices(count)] += _NOISE / lit**2 + _LEAKAGE * foreign**2
-    inverse = np.linalg.inv(system)[:, :count]
-    shared = common @ inverse[:count]
-    weights: Float32 = np.empty((3, len(offsets), count), np.float32)
+    inverse = np.linalg.inv(system)[:count]
+    shared = inverse[:, :count] @ common
+    weights: Float32 = np.empty((count, common.shape[1], 3), np.float32)
     for colour in range(3):
-        own = colours == colour
-        weights[colour] = shared + _COLOUR_SHARE * common[:, own] @ inverse[:count][own] + inverse[count + colour]
-    turned = matrix.astype(np.float32) @ weights.reshape(3, -1)
-    # As (P, N, 3).
-    by_pixel = np.ascontiguousarray(turned.reshape(3, -1).T).reshape(len(offsets), count, 3).transpose(1, 0, 2)
-    flat = np.ascontiguousarray(by_pixel).reshape(count, -1)
-    return Operator(pixels, _inner_neighbours(pixels, centre), flat)
+        own = np.flatnonzero(colours == colour)
+        weights[..., colour] = shared + _COLOUR_SHARE * inverse[:, own] @ common[own] + inverse[:, count + colour, None]
+    turned = weights.reshape(-1, 3) @ matrix.T.astype(np.float32)
+    return Operator(pixels, _inner_neighbours(pixels, centre), turned.reshape(count, -1))
 
 
 def _cells(centres: Float64) -> tuple[Index, Index]:
@@ -220,10 +222,10 @@ def _inner_neighbours(pixels: Index, centre: Float64) -> Index:  # pragma: no co
 def _covariances(
     pixels: Index, colours: IntArray, targets: Float64, table: Float64
 ) -> tuple[Float64, Float64]:  # pragma: no cover
-    """Return the kriging system without noise, ``(P + 3, P + 3)``, and what targets and pixels share, ``(N, P)``."""
+    """Return the kriging system without noise, ``(P + 3, P + 3)``, and what pixels and targets share, ``(P, N)``."""
     count = pixels.shape[0]
     system = np.zeros((count + 3, count + 3))
-    common = np.empty((targets.shape[0], count))
+    common = np.empty((count, targets.shape[0]))
     for i in range(count):
         system[count + colours[i], i] = system[i, count + colours[i]] = 1.0
         for j in range(i + 1):
@@ -232,10 +234,10 @@ def _covariances(
             if colours[i] == colours[j]:
                 found *= 1 + _COLOUR_SHARE
             system[i, j] = system[j, i] = found
-    for n in range(targets.shape[0]):
-        for i in range(count):
+    for i in range(count):
+        for n in range(targets.shape[0]):
             dx, dy = targets[n, 0] - pixels[i, 0], targets[n, 1] - pixels[i, 1]
-            common[n, i] = table[int(np.sqrt(dx * dx + dy * dy) / _TABLE_STEP_PX + 0.5)]
+            common[i, n] = table[int(np.sqrt(dx * dx + dy * dy) / _TABLE_STEP_PX + 0.5)]
     return system, common
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import threading
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Protocol, TypeAlias
@@ -19,7 +20,7 @@ from lfstereo.lightfield.hexagons import hexagon_weights
 from lfstereo.lightfield.micro_images import Index
 from lfstereo.progress import Progress, silent
 
-_ROWS_PER_BAND = 18
+_ROWS_PER_BAND = 36
 _COLUMNS_AT_ONCE = 16
 """View columns of all views that are computed before they are written, so that they stay in the processor's cache."""
 IntArray: TypeAlias = npt.NDArray[np.int64]
@@ -67,8 +68,8 @@ def view_offsets(sampling: ViewSampling, count: int) -> Float64:
 class LensletReader(Protocol):
     """Gives the views' colours at the lenslets of some rows, on the hexagonal lattice."""
 
-    def __call__(self, start: int, stop: int) -> tuple[Float32, Index]:
-        """Return ``(lenslets, 3 N)`` values and the ``(rows, columns)`` places of the lenslets among them."""
+    def __call__(self, start: int, stop: int, values: Float32) -> Index:
+        """Fill ``(lenslets, 3 N)`` values and return the ``(rows, columns)`` places of the lenslets among them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,12 +88,11 @@ class LensletImage:
     offsets: Float64
     """``(N, 2)`` (x, y) px of the views from a micro-image's centre."""
 
-    def __call__(self, start: int, stop: int) -> tuple[Float32, Index]:
-        """Return the views' colours at the lenslets of some rows, as :class:`LensletReader` says."""
+    def __call__(self, start: int, stop: int, values: Float32) -> Index:
+        """Read the views' colours at the lenslets of some rows, as :class:`LensletReader` says."""
         centres = self.centres[start:stop].reshape(-1, 2)
-        values: Float32 = np.empty((len(centres), 3 * len(self.offsets)), np.float32)
         _sample_lenslets(self.image, centres, self.offsets, values.reshape(len(centres), -1, 3))
-        return values, np.arange(len(centres), dtype=np.int32).reshape(stop - start, -1)
+        return np.arange(len(centres), dtype=np.int32).reshape(stop - start, -1)
 
 
 def sample_views(
@@ -136,11 +136,15 @@ def sample_views(
     flat_views = views.reshape(count * count, grid.rows, columns, 3)
     flat_weights = weights.reshape(count * count, grid.rows, columns)
     starts = range(0, grid.rows, _ROWS_PER_BAND)
+    room = threading.local()
 
     def task(start: int) -> None:
         stop = min(start + _ROWS_PER_BAND, grid.rows)
         halo = max(start - 1, 0), min(stop + 1, grid.rows)
-        values, places = read(*halo)
+        if not hasattr(room, "values"):
+            room.values = np.empty(((_ROWS_PER_BAND + 2) * grid.columns, 3 * len(offsets)), np.float32)
+        values: Float32 = room.values[: (halo[1] - halo[0]) * grid.columns]
+        places = read(*halo, values)
         for row in range(start, stop):
             shifted = (row + grid.first_shifted_row) % 2 == 0
             # The lattice is symmetric about a row, so beyond the first and last row the other neighbour serves.
