@@ -25,7 +25,6 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "rig": ("lfstereo.cli.rig", "a rig to and from the files of OpenCV, Kalibr and others"),
     "decode": ("lfstereo.cli.decode", "raw capture to 4-D light field"),
     "whites": ("lfstereo.cli.whites", "the white images: import them, list them, check their grids"),
-    "whites": ("lfstereo.cli.whites", "the white images: import them, list them, check their grids"),
     "view-grid": ("lfstereo.cli.view_grid", "picture of a lenslet grid over its frame, and of what it leaves"),
     "export": ("lfstereo.cli.export", "light field or raw capture to the format of another program"),
     "refocus": ("lfstereo.cli.refocus", "focal stack, or a picture focused at will, of one light field or of a pair"),
@@ -87,30 +86,6 @@ def main(argv: Sequence[str] | None = None) -> int:
             file=sys.stderr,
         )
         return 1
-
-
-@contextmanager
-def _told_warnings(command: str) -> Iterator[None]:
-    """Print the project's own warnings as one line each on stderr; all others go where they always go."""
-
-    def show(
-        message: Warning | str,
-        category: type[Warning],
-        filename: str,
-        lineno: int,
-        file: TextIO | None = None,
-        line: str | None = None,
-    ) -> None:
-        if issubclass(category, QualityWarning):
-            print(f"lfstereo {command}: warning: {message}", file=sys.stderr)
-        else:
-            others(message, category, filename, lineno, file, line)
-
-    with warnings.catch_warnings():
-        others = warnings.showwarning
-        warnings.simplefilter("always", QualityWarning)
-        warnings.showwarning = show
-        yield
 
 
 @contextmanager
