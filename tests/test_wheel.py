@@ -31,6 +31,9 @@ def test_every_module_and_asset_is_inside(wheel: zipfile.ZipFile) -> None:
     inside = set(wheel.namelist())
     modules = {str(p.relative_to(ROOT)) for p in (ROOT / "lfstereo").rglob("*.py")}
     assert modules <= inside
+    page = {str(p.relative_to(ROOT)) for p in (ROOT / "lfstereo/viewer/page").iterdir()}
+    assert page
+    assert page <= inside
     for kind in ("calib", "models"):
         files = {f"lfstereo/_assets/{p.relative_to(ROOT)}" for p in (ROOT / kind).rglob("*") if p.is_file()}
         assert files <= inside

@@ -73,4 +73,5 @@ def _below(root: Path) -> list[Item]:
             if not name.startswith(".") and suffix in (*SUFFIXES, *_CAPTURES_IN_FOLDERS):
                 kind = "light field" if suffix in SUFFIXES else "capture"
                 items.append(Item(path.relative_to(root).as_posix(), path, kind))  # type: ignore[arg-type]
-    return [item for item in items if item.path.resolve().is_relative_to(inside)]
+    items = [item for item in items if item.path.resolve().is_relative_to(inside)]
+    return sorted(items, key=lambda item: item.name.casefold())

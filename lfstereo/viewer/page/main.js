@@ -43,7 +43,7 @@ function buildModes() {
 
 function buildTitle() {
   const title = byId("title");
-  CONTENT.title.forEach((part, k) => title.append(...(k ? [element("span", { textContent: "/" })] : []), part));
+  CONTENT.title.forEach((part, k) => title.append(...(k ? [element("span", { textContent: " / " })] : []), part));
   byId("lede").textContent = CONTENT.lede;
   byId("made").textContent = CONTENT.made;
 }

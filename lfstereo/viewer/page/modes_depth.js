@@ -23,36 +23,37 @@ const depthMode = {
   doubts() {
     this.layers.doubt ||= painted((data, i, k) => {
       const share = DOUBT[i] === 255 ? 0 : clamp((DOUBT[i] * CONTENT.doubt.px_per_code) / DOUBT_FULL_PX, 0, 1);
-      data[k] = 255;
-      data[k + 1] = 150 + 90 * share;
-      data[k + 2] = 30 + 190 * share * share;
-      data[k + 3] = DOUBT[i] === 255 ? 0 : 255 * Math.min(1, 1.5 * share);
+      if (DOUBT[i] === 255) data[k + 3] = 150;
+      else {
+        data[k] = 255;
+        data[k + 1] = 150 + 90 * share;
+        data[k + 2] = 30 + 190 * share * share;
+        data[k + 3] = 255 * Math.min(1, 1.5 * share);
+      }
     });
     return this.layers.doubt;
   },
   draw(context) {
-    context.filter = this.doubt ? "grayscale(1) brightness(.5)" : "none";
+    context.filter = this.doubt ? "grayscale(1) brightness(.62)" : "none";
     drawPicture(context, CONTENT.pictures.sharp);
-    context.globalAlpha = this.opacity;
-    context.drawImage(this.colours(this.hide), 0, 0);
-    context.globalAlpha = 1;
     context.filter = "none";
-    if (this.doubt) context.drawImage(this.doubts(), 0, 0);
+    context.globalAlpha = this.doubt ? 1 : this.opacity;
+    context.drawImage(this.doubt ? this.doubts() : this.colours(this.hide), 0, 0);
+    context.globalAlpha = 1;
   },
   panel() {
-    const controls = [
+    const ofMap = [
       rangeControl("Disparity over image", { min: 0, max: 1, step: 0.01, value: this.opacity },
         (value) => `${Math.round(100 * value)} %`, (value) => { this.opacity = value; redraw(); }),
       switchControl("Hide what one camera alone sees", this.hide, (on) => { this.hide = on; redraw(); }),
     ];
-    if (DOUBT) {
-      controls.push(switchControl("Show doubt", this.doubt, (on) => {
-        this.doubt = on;
-        legend.hidden = !on;
-        redraw();
-      }, "doubt"));
-    }
-    const legend = element("div", { hidden: !this.doubt, className: "actions" });
+    const controls = [...ofMap];
+    const fit = () => {
+      legend.hidden = !this.doubt;
+      for (const control of ofMap) control.hidden = this.doubt;
+    };
+    if (DOUBT) controls.push(switchControl("Show doubt instead", this.doubt, (on) => { this.doubt = on; fit(); redraw(); }, "doubt"));
+    const legend = element("div", { className: "actions" });
     if (DOUBT) {
       const ramp = "linear-gradient(90deg, rgb(80 80 80), rgb(255 190 60) 55%, rgb(255 240 220))";
       legend.append(
@@ -60,6 +61,7 @@ const depthMode = {
         element("div", {}, element("span", { textContent: "0" }), element("span", { textContent: `≥ ${DOUBT_FULL_PX} px` })),
         element("p", { className: "note", textContent: CONTENT.doubt.label }));
     }
+    fit();
     return [
       ...heading("Disparity", "How far each point lies apart in the two views, warm for near. The scale below the picture gives the colours in metres and px."),
       ...controls, legend,

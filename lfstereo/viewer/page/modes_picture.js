@@ -107,7 +107,7 @@ const focusMode = {
     const value = this.value(), metres = AXIS.metric ? metresOf(value) : null;
     const under = [AXIS.metric ? `${value.toFixed(1)} px` : "", this.live || !SLICES.length ? "" : `slice ${this.slice() + 1} of ${SLICES.length}`];
     this.big.replaceChildren(
-      AXIS.metric ? metresText(metres) : value.toFixed(3).replace("-", "−"), element("small", { textContent: AXIS.metric ? "m" : AXIS.unit }),
+      AXIS.metric ? metresText(metres) : value.toFixed(3).replace("-", "−"), " ", element("small", { textContent: AXIS.metric ? "m" : AXIS.unit }),
       element("span", { className: "under", textContent: under.filter(Boolean).join(" · ") || "0 = plane the lens was focused at" }));
     focusInput.setAttribute("aria-valuetext", AXIS.metric ? `${metresText(metres)} m` : `${value.toFixed(3)} ${AXIS.unit}`);
   },

@@ -64,7 +64,7 @@ function placeNeedle(value) {
 
 // Readings of the pixel under the cursor.
 const READINGS = [
-  { name: "Column, row", of: (at) => `${at.x}, ${at.y}`, unit: "px", wide: true },
+  { name: "Column, row", of: (at) => `${at.x},\u2002${at.y}`, unit: "px" },
   { name: "Disparity", of: (at) => disparityAt(at.x, at.y).toFixed(2), unit: "px", shown: Boolean(DISPARITY), id: "disparity" },
   { name: "Depth", of: (at) => metresText(metresOf(disparityAt(at.x, at.y))), unit: "m", shown: Boolean(DISPARITY), id: "depth" },
   { name: "Doubt", of: (at) => { const d = doubtAt(at.x, at.y); return d === null ? "—" : d.toFixed(2); }, unit: "px", shown: Boolean(DOUBT), id: "doubt", optional: true },
@@ -77,13 +77,14 @@ function buildReadout() {
     reading.target = element("dd", { className: "none", textContent: "—", id: reading.id ? `reading-${reading.id}` : "" });
     return element("div", { className: reading.optional ? "optional" : "" }, element("dt", { textContent: reading.name }), reading.target);
   }));
+  showReadout();
 }
 
 function showReadout() {
   for (const reading of READINGS) {
     const text = cursor ? reading.of(cursor) : "—";
     reading.target.className = text === "—" ? "none" : "";
-    reading.target.replaceChildren(text, ...(text === "—" || !reading.unit ? [] : [element("small", { textContent: reading.unit })]));
+    reading.target.replaceChildren(text, ...(text === "—" || !reading.unit ? [] : [" ", element("small", { textContent: reading.unit })]));
   }
   placeNeedle(cursor && DISPARITY ? disparityAt(cursor.x, cursor.y) : null);
 }

@@ -10,7 +10,7 @@ function sheet(title, about, ...content) {
 
 function figure(name, value, unit = "") {
   return element("div", {}, element("dt", { textContent: name }),
-    element("dd", {}, value, ...(unit ? [element("small", { textContent: unit })] : [])));
+    element("dd", {}, value, ...(unit ? [" ", element("small", { textContent: unit })] : [])));
 }
 
 const total = (table) => Object.values(table).reduce((sum, value) => sum + value, 0);

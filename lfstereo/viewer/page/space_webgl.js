@@ -22,7 +22,10 @@ void main() {
 // Whether a graphics processor does the work: asked of another canvas, since a canvas keeps its first context.
 function webglIsFast() {
   const gl = offscreen(1, 1).getContext("webgl2", { failIfMajorPerformanceCaveat: true });
-  return Boolean(gl) && !/swiftshader|llvmpipe|software|basic render/i.test(gl.getParameter(gl.RENDERER));
+  if (!gl) return false;
+  const hidden = /^WebKit/.test(gl.getParameter(gl.RENDERER)) && gl.getExtension("WEBGL_debug_renderer_info");
+  const name = gl.getParameter(hidden ? hidden.UNMASKED_RENDERER_WEBGL : gl.RENDERER);
+  return !/swiftshader|llvmpipe|software|basic render/i.test(name);
 }
 
 function webglRenderer(canvas, scene, evenIfSlow) {
