@@ -11,9 +11,12 @@ import numpy as np
 from lfstereo.arrays import UInt8, UInt16
 from lfstereo.assets import asset_folder
 from lfstereo.container.capture import IMAGE_SUFFIXES, Capture
+from lfstereo.container.jpeg_mosaic import restore_mosaic
 from lfstereo.container.metadata import FrameMetadata, parse_metadata
 from lfstereo.errors import AssetError, ContainerError
 from lfstereo.options import read_toml
+
+_FINER = 16
 
 
 def camera_names() -> tuple[str, ...]:
@@ -59,8 +62,8 @@ def read_camera_profile(camera: str, bits: int | None = None) -> FrameMetadata:
 def read_mosaic_image(path: Path, camera: str) -> Capture:
     """Read a raw mosaic stored as a JPEG, PNG or TIFF of one channel.
 
-    The Bayer pattern is the highest spatial frequency there is, and JPEG drops that first: where a mosaic is dim or
-    smooth its four sites come back equal. A white balance would tint such places, so a JPEG gets neutral gains.
+    A JPEG gets its Bayer pattern back as far as the file allows (`restore_mosaic`), with 4 bits more than the file's 8
+    to hold it.
 
     Parameters
     ----------
@@ -95,8 +98,25 @@ def read_mosaic_image(path: Path, camera: str) -> Capture:
     if pixels.dtype == np.uint16:
         metadata = replace(metadata, bits_per_pixel=16, endianness="little")
     if path.suffix.lower() in (".jpg", ".jpeg"):
-        metadata = replace(metadata, white_balance=(1.0, 1.0, 1.0, 1.0))
+        return _restored(path, pixels.astype(np.uint8), metadata)
     return Capture(mosaic=pixels.astype(np.uint16), metadata=metadata, source=str(path))
+
+
+def _restored(path: Path, pixels: UInt8, metadata: FrameMetadata) -> Capture:
+    """Return the capture of a JPEG, its numbers sixteen times as large and its Bayer pattern restored."""
+    from PIL import Image
+
+    with Image.open(path) as picture:
+        steps = np.reshape(picture.quantization[0], (8, 8))  # type: ignore[attr-defined]
+    red, green_r, green_b, blue = (1 / gain for gain in metadata.white_balance)
+    greens = (green_r, green_b) if metadata.bayer.index("r") < 2 else (green_b, green_r)
+    white = [{"r": red, "b": blue, "g": greens[site // 2]}[colour] for site, colour in enumerate(metadata.bayer)]
+    restored = restore_mosaic(pixels, steps, float(np.mean(metadata.black)), (white[0], white[1], white[2], white[3]))
+    black = tuple(_FINER * level for level in metadata.black)
+    highest = tuple(_FINER * level for level in metadata.white)
+    mosaic = np.clip(np.rint(_FINER * restored), 0, max(highest)).astype(np.uint16)
+    finer = replace(metadata, black=black, white=highest, bits_per_pixel=16, endianness="little")
+    return Capture(mosaic=mosaic, metadata=finer, source=str(path))
 
 
 def _read_pixels(path: Path) -> UInt8 | UInt16:

@@ -48,8 +48,7 @@ def conversion(source: Primaries, target: Primaries) -> Float64:
     """
     if source == target:
         return np.eye(3)
-    matrix: Float64 = np.linalg.solve(to_d50(target), to_d50(source))
-    return matrix
+    return np.asarray(np.linalg.solve(to_d50(target), to_d50(source)), np.float64)
 
 
 @cache

@@ -112,13 +112,16 @@ def test_image_cut_off(tmp_path: Path, small_camera: str) -> None:
 def test_real_photograph(real_data: Path) -> None:
     found = read_mosaic_image(real_data / "raw" / "tao_f01" / "IMG_1.jpg", "lytro-f01")
     assert found.mosaic.shape == (3280, 3280)
-    assert (found.metadata.black[0], found.metadata.bits_per_pixel) == (10.46, 8)
-    assert 10 <= np.percentile(found.mosaic, 1) <= 20  # the black level, as stored
+    assert (found.metadata.black[0], found.metadata.bits_per_pixel) == (pytest.approx(16 * 10.46), 16)
+    assert 9 <= np.percentile(found.mosaic, 1) / 16 <= 20  # the black level, as stored
 
 
-def test_a_jpeg_gets_neutral_gains_and_a_png_the_profile_s(tmp_path: Path) -> None:
-    flat = np.full((3280, 3280), 100, np.uint8)
-    for suffix, blue in ((".jpg", 1.0), (".png", 1.48)):
+def test_a_jpeg_gets_its_pattern_back_and_a_png_stays_as_it_is(tmp_path: Path) -> None:
+    flat = np.full((3280, 3280), 60, np.uint8)
+    for suffix, levels in ((".jpg", 16), (".png", 1)):
         iio.imwrite(tmp_path / f"flat{suffix}", flat)
         capture = read_mosaic_image(tmp_path / f"flat{suffix}", "lytro-f01")
-        assert capture.metadata.white_balance[3] == blue
+        assert capture.metadata.white_balance == (1.01, 1.0, 1.0, 1.48)
+        assert capture.metadata.white == (255.0 * levels,) * 4
+        blue, green = (float(capture.mosaic[0, k]) / levels - 10.46 for k in (0, 1))
+        assert blue / green == pytest.approx(1 / 1.48 if suffix == ".jpg" else 1.0, abs=0.1)
