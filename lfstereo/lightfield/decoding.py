@@ -117,7 +117,8 @@ def views_from(
         ``(N, 2)`` (x, y) pixels that are known to be bad.
     """
     count = view_count(grid, options.view)
-    sampling = view_sampling(grid, options.view.view_step_px)
+    upsampling, interpolation = options.view.upsampling, options.view.interpolation
+    sampling = view_sampling(grid, options.view.view_step_px, upsampling)
     offsets = offsets_inside(grid, sampling, count)
     read: LensletReader
     if options.develop.demosaic == "micro-images":
@@ -128,7 +129,8 @@ def views_from(
         picture = develop(capture, shading, options.develop, hot_pixels, grid)
         read = LensletImage(picture, grid.centres(), offsets)
     progress(30, 100)
-    views, weight = sample_views(read, shading, grid, sampling, count, part_of(progress, 30, 100))
+    part = part_of(progress, 30, 100)
+    views, weight = sample_views(read, shading, grid, sampling, count, part, upsampling, interpolation)
     return LightField(
         views=views,
         weight=weight,
@@ -166,11 +168,14 @@ def view_count(grid: LensletGrid, options: ViewOptions) -> int:
     Raises
     ------
     ConfigError
-        If the options ask for an even or negative number of views, or for a distance that is not positive.
+        If the options ask for an even or negative number of views, or for a distance that is not positive, or
+        an upsampling that cannot be.
     """
     step = options.view_step_px
     if not 0.1 <= step <= 10:
         raise ConfigError(f"view_step_px: found {step:g}, expected 0.1 to 10 sensor px; leave it out for 0.884")
+    if not 1 <= options.upsampling <= 4:
+        raise ConfigError(f"upsampling: found {options.upsampling}, expected 1 to 4 view pixels per row of lenslets")
     if options.views:
         if options.views < 1 or options.views % 2 == 0:
             raise ConfigError(f"views: found {options.views}, expected an odd number so that there is a centre view")

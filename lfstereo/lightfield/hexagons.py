@@ -13,8 +13,8 @@ PHASES = 64
 """Positions between two lenslets of a row that have weights of their own."""
 REACH_OWN, REACH_NEXT = 2, 2
 """Lenslets used to either side, in the row of the point and in the rows above and below it."""
-_PITCH = 2 / np.sqrt(3)
-"""Unit of length here: the distance of two rows."""
+PITCH = 2 / np.sqrt(3)
+"""Distance of two lenslets of a row; the unit of length here is the distance of two rows."""
 _DETAIL_POWER = 1.2
 _NOISE = 1e-4
 
@@ -46,7 +46,13 @@ def hexagon_weights() -> Float32:
     """
     own = [(float(k), 0.0) for k in range(-REACH_OWN, REACH_OWN + 1)]
     beside = [(k + 0.5, row) for row in (-1.0, 1.0) for k in range(-REACH_NEXT, REACH_NEXT)]
-    places = np.array(own + beside) * (_PITCH, 1.0)
+    places = np.array(own + beside) * (PITCH, 1.0)
+    along = (np.arange(PHASES + 1) / PHASES - 0.5) * PITCH
+    return kriging_weights(places, np.stack([along, np.zeros_like(along)], axis=1))
+
+
+def kriging_weights(places: Float64, targets: Float64) -> Float32:
+    """Return ``(T, P)`` weights of lenslets at ``places`` for points at ``targets``, (x, y) in distances of rows."""
     covariance = lenslet_covariance()
     count = len(places)
     drift = _drift(places)
@@ -55,12 +61,9 @@ def hexagon_weights() -> Float32:
     system[:count, :count] = np.interp(between, *covariance) + _NOISE * np.eye(count)
     system[:count, count:] = drift
     system[count:, :count] = drift.T
-    weights = np.empty((PHASES + 1, count), np.float32)
-    for phase in range(PHASES + 1):
-        target = np.array([[(phase / PHASES - 0.5) * _PITCH, 0.0]])
-        right = np.append(np.interp(np.hypot(*(places - target).T), *covariance), _drift(target))
-        weights[phase] = np.linalg.solve(system, right)[:count]
-    return weights
+    towards = np.hypot(*(places[:, None] - targets[None]).transpose(2, 0, 1))
+    right = np.concatenate([np.interp(towards, *covariance), _drift(targets).T])
+    return np.asarray(np.linalg.solve(system, right)[:count].T, np.float32)
 
 
 def _drift(places: Float64) -> Float64:
@@ -75,7 +78,7 @@ def lenslet_covariance() -> tuple[Float64, Float64]:
     size, step = 512, 0.25
     frequency = np.fft.fftfreq(size, step)
     radial = np.hypot(*np.meshgrid(frequency, frequency))
-    argument = np.maximum(np.pi * radial * _PITCH, 1e-9)
+    argument = np.maximum(np.pi * radial * PITCH, 1e-9)
     aperture = 2 * j1(argument) / argument
     spectrum = aperture**2 / np.maximum(radial, 1 / 64) ** (2 * _DETAIL_POWER)
     profile = np.fft.ifft2(spectrum).real[0, : size // 2]

@@ -18,6 +18,10 @@ class ViewOptions:
 
     view_step_px: float = option(0.884, "distance between neighbouring views inside a micro-image", "sensor px")
     views: int = option(0, "views per direction, odd; 0 = as many as the micro-images hold")
+    upsampling: int = option(1, "view pixels per row of lenslets, 1 to 4; the memory grows with its square")
+    interpolation: Literal["kriging", "barycentric"] = option(
+        "kriging", "how the hexagonal lattice of lenslets becomes square pixels: best linear estimate, or triangles"
+    )
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,6 +16,7 @@ from threadpoolctl import threadpool_limits
 from lfstereo.arrays import Float32, Float64, Rgb, UInt8, Views
 from lfstereo.lenslet.grid import LensletGrid
 from lfstereo.lightfield.field import ViewSampling
+from lfstereo.lightfield.fine_rows import Interpolation, fine_weights
 from lfstereo.lightfield.hexagons import hexagon_weights
 from lfstereo.lightfield.micro_images import Index
 from lfstereo.progress import Progress, silent
@@ -26,7 +27,7 @@ _COLUMNS_AT_ONCE = 16
 IntArray: TypeAlias = npt.NDArray[np.int64]
 
 
-def view_sampling(grid: LensletGrid, view_step_px: float) -> ViewSampling:
+def view_sampling(grid: LensletGrid, view_step_px: float, upsampling: int = 1) -> ViewSampling:
     """Place square view pixels on a hexagonal lattice: one row per lenslet row, steps equal in x and y.
 
     Parameters
@@ -35,18 +36,20 @@ def view_sampling(grid: LensletGrid, view_step_px: float) -> ViewSampling:
         The lenslet grid.
     view_step_px
         Sensor px between neighbouring views.
+    upsampling
+        View pixels per row of lenslets, and as many times more columns.
 
     Returns
     -------
-    Where the view pixels lie. View row v lies on lenslet row v; view column 0 lies on column 0 of the rows that
-    are not shifted.
+    Where the view pixels lie. Without upsampling view row v lies on lenslet row v; view column 0 lies on column 0 of
+    the rows that are not shifted.
     """
     step_u, step_v = np.asarray(grid.step_u_px), np.asarray(grid.step_v_px)
     along = step_u / np.hypot(*step_u)
     across = np.array([-along[1], along[0]])
     return ViewSampling(
         origin_px=grid.origin_px,
-        step_px=(float(np.hypot(*step_u) * np.sqrt(3) / 2), float(step_v @ across)),
+        step_px=(float(np.hypot(*step_u) * np.sqrt(3) / 2) / upsampling, float(step_v @ across) / upsampling),
         rotation_rad=float(np.arctan2(along[1], along[0])),
         view_step_px=view_step_px,
     )
@@ -102,8 +105,13 @@ def sample_views(
     sampling: ViewSampling,
     count: int,
     progress: Progress = silent,
+    upsampling: int = 1,
+    interpolation: Interpolation = "kriging",
 ) -> tuple[Views, UInt8]:
-    """Turn the hexagonal lattice of lenslets into views of square pixels, by the weights of :func:`hexagon_weights`.
+    """Turn the hexagonal lattice of lenslets into views of square pixels.
+
+    By the weights of :func:`hexagon_weights` where every view row lies on a row of lenslets, else of
+    :func:`fine_weights`.
 
     Parameters
     ----------
@@ -119,39 +127,48 @@ def sample_views(
         Views per direction, odd.
     progress
         Told of each band of rows.
+    upsampling
+        View pixels per row of lenslets, as the sampling was made with.
+    interpolation
+        How the lattice is interpolated.
 
     Returns
     -------
     Views ``(T, S, V, U, 3)`` float32, not below 0, and weights ``(T, S, V, U)`` uint8, 255 = full light. Views
     that would look through a neighbouring lenslet are 0 in both; off the sensor the weight is 0.
     """
-    columns = view_columns(grid)
-    views = np.zeros((count, count, grid.rows, columns, 3), np.float32)
-    weights = np.zeros((count, count, grid.rows, columns), np.uint8)
+    shape = (count, count, upsampling * grid.rows, upsampling * view_columns(grid))
+    views = np.zeros((*shape, 3), np.float32)
+    weights = np.zeros(shape, np.uint8)
     offsets = offsets_inside(grid, sampling, count)
     numbers = np.flatnonzero(views_inside(grid, sampling, count))
     centres = grid.centres()
-    first, step = _column_positions(grid, sampling)
-    table = hexagon_weights()
-    flat_views = views.reshape(count * count, grid.rows, columns, 3)
-    flat_weights = weights.reshape(count * count, grid.rows, columns)
+    flat_views, flat_weights = views.reshape(-1, *shape[2:], 3), weights.reshape(-1, *shape[2:])
     starts = range(0, grid.rows, _ROWS_PER_BAND)
     room = threading.local()
 
     def task(start: int) -> None:
         stop = min(start + _ROWS_PER_BAND, grid.rows)
-        halo = max(start - 1, 0), min(stop + 1, grid.rows)
+        halo = max(min(start - 1, grid.rows - 3), 0), min(stop + 2, grid.rows)
         if not hasattr(room, "values"):
-            room.values = np.empty(((_ROWS_PER_BAND + 2) * grid.columns, 3 * len(offsets)), np.float32)
+            room.values = np.empty(((_ROWS_PER_BAND + 4) * grid.columns, 3 * len(offsets)), np.float32)
         values: Float32 = room.values[: (halo[1] - halo[0]) * grid.columns]
         places = read(*halo, values)
         for row in range(start, stop):
-            shifted = (row + grid.first_shifted_row) % 2 == 0
-            # The lattice is symmetric about a row, so beyond the first and last row the other neighbour serves.
-            around = [row, row - 1 if row > 0 else row + 1, row + 1 if row + 1 < grid.rows else row - 1]
-            near = places[np.clip(np.array(around) - halo[0], 0, len(places) - 1)]
-            _blend_row(values, near, numbers, first[row], step, shifted, table, row, flat_views)
-            _weigh_row(shading, centres[row], offsets, numbers, first[row], step, row, flat_weights)
+            half = int((row + grid.first_shifted_row) % 2 == 0)
+            # The lattice is symmetric about a row, so beyond the first and last row those on the other side serve.
+            around = np.abs(np.arange(row - 1, row + 3))
+            around = np.where(around < grid.rows, around, 2 * (grid.rows - 1) - around)
+            near = places[np.clip(around - halo[0], 0, len(places) - 1)]
+            for part in range(upsampling):
+                line, down = upsampling * row + part, part / upsampling
+                first, step = _column_position(grid, sampling, row, down)
+                if upsampling == 1 and interpolation == "kriging":
+                    _blend_row(values, near, numbers, first, step, half, hexagon_weights(), line, flat_views)
+                else:
+                    table = fine_weights(interpolation, upsampling)[part]
+                    _blend_fine_row(values, near, numbers, first, step, half, table, line, flat_views)
+                _weigh_row(shading, centres[row], offsets, numbers, first, step, line, flat_weights)
 
     with threadpool_limits(1, user_api="blas"), ThreadPoolExecutor(max_workers=os.cpu_count() or 1) as pool:
         for done, _ in enumerate(pool.map(task, starts)):
@@ -174,14 +191,16 @@ def offsets_inside(grid: LensletGrid, sampling: ViewSampling, count: int) -> Flo
     return np.asarray(offsets, np.float64)
 
 
-def _column_positions(grid: LensletGrid, sampling: ViewSampling) -> tuple[Float64, float]:
-    """Return for each row the lenslet coordinate of view column 0, and the lenslets per view column."""
+def _column_position(grid: LensletGrid, sampling: ViewSampling, row: int, down: float) -> tuple[float, float]:
+    """Return the lenslet coordinate in a row of view column 0, and the lenslets per view column.
+
+    ``down`` is how far below the row the view pixels lie, in distances of rows.
+    """
     pitch = float(np.hypot(*grid.step_u_px))
     along = np.asarray(grid.step_u_px) / pitch
     lean = float(np.asarray(grid.step_v_px) @ along) / pitch
-    rows = np.arange(grid.rows)
-    shift = 0.5 * ((rows + grid.first_shifted_row) % 2 == 0)
-    return -rows * lean - shift, sampling.step_px[0] / pitch
+    shift = 0.5 * ((row + grid.first_shifted_row) % 2 == 0)
+    return -(row + down) * lean - shift, sampling.step_px[0] / pitch
 
 
 @numba.njit(cache=True, nogil=True, inline="always")  # type: ignore[untyped-decorator]
@@ -223,16 +242,17 @@ def _blend_row(
     numbers: IntArray,
     first: float,
     step: float,
-    shifted: bool,
+    half: int,
     table: Float32,
     v: int,
     views: Float32,
 ) -> None:  # pragma: no cover
     """Fill row ``v`` of the views, a few columns of all views at a time.
 
-    ``places`` ``(3, columns)`` says where the lenslets of the row, the one above and the one below stand.
+    ``places`` ``(4, columns)`` says where the lenslets of the row above, the row and the two below stand; ``half`` is 1
+    in a row that lies half a pitch to the right.
     """
-    lenslets, half = places.shape[1], 1 if shifted else 0
+    lenslets = places.shape[1]
     columns, size = views.shape[2], values.shape[1]
     block = np.empty((_COLUMNS_AT_ONCE, size), np.float32)
     zero = np.float32(0.0)
@@ -247,21 +267,72 @@ def _blend_row(
             lower = min(int(phase), table.shape[0] - 2)
             for tap in range(13):
                 if tap < 5:
-                    row, k = 0, nearest + tap - 2
+                    row, k = 1, nearest + tap - 2
                 elif tap < 9:
-                    row, k = 1, nearest + tap - 7 + half
+                    row, k = 0, nearest + tap - 7 + half
                 else:
                     row, k = 2, nearest + tap - 11 + half
                 weight = table[lower, tap] + np.float32(phase - lower) * (table[lower + 1, tap] - table[lower, tap])
                 source = values[places[row, min(max(k, 0), lenslets - 1)]]
                 for m in range(size):
                     blended[m] += weight * source[m]
-        for n in range(numbers.shape[0]):
-            target = views[numbers[n], v]
-            for u in range(start, stop):
-                target[u, 0] = max(block[u - start, 3 * n], zero)
-                target[u, 1] = max(block[u - start, 3 * n + 1], zero)
-                target[u, 2] = max(block[u - start, 3 * n + 2], zero)
+        _write_block(block, numbers, start, stop, v, views)
+
+
+@numba.njit(cache=True, nogil=True, fastmath=True)  # type: ignore[untyped-decorator]
+def _blend_fine_row(
+    values: Float32,
+    places: Index,
+    numbers: IntArray,
+    first: float,
+    step: float,
+    half: int,
+    table: Float32,
+    v: int,
+    views: Float32,
+) -> None:  # pragma: no cover
+    """Fill row ``v`` of the views as :func:`_blend_row`, by sixteen lenslets of four rows."""
+    lenslets = places.shape[1]
+    columns, size = views.shape[2], values.shape[1]
+    block = np.empty((_COLUMNS_AT_ONCE, size), np.float32)
+    for start in range(0, columns, _COLUMNS_AT_ONCE):
+        stop = min(start + _COLUMNS_AT_ONCE, columns)
+        for u in range(start, stop):
+            blended = block[u - start]
+            blended[:] = np.float32(0.0)
+            position = min(max(first + u * step, 0.0), lenslets - 1.0)
+            left = int(position)
+            phase = 2 * (position - left)
+            right_half = int(phase)
+            phase = (phase - right_half) * (table.shape[1] - 1)
+            lower = min(int(phase), table.shape[1] - 2)
+            near, far = table[right_half, lower], table[right_half, lower + 1]
+            for tap in range(16):
+                weight = near[tap] + np.float32(phase - lower) * (far[tap] - near[tap])
+                if weight == 0:
+                    continue
+                row = tap // 4
+                k = left - 1 + tap % 4
+                if row % 2 == 0:
+                    k += right_half - 1 + half
+                source = values[places[row, min(max(k, 0), lenslets - 1)]]
+                for m in range(size):
+                    blended[m] += weight * source[m]
+        _write_block(block, numbers, start, stop, v, views)
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _write_block(
+    block: Float32, numbers: IntArray, start: int, stop: int, v: int, views: Float32
+) -> None:  # pragma: no cover
+    """Write some columns of all views, not below 0."""
+    zero = np.float32(0.0)
+    for n in range(numbers.shape[0]):
+        target = views[numbers[n], v]
+        for u in range(start, stop):
+            target[u, 0] = max(block[u - start, 3 * n], zero)
+            target[u, 1] = max(block[u - start, 3 * n + 1], zero)
+            target[u, 2] = max(block[u - start, 3 * n + 2], zero)
 
 
 @numba.njit(cache=True, nogil=True, fastmath=True)  # type: ignore[untyped-decorator]

@@ -18,9 +18,11 @@ from lfstereo.errors import AssetError, ConfigError, GridFitError
 from lfstereo.lenslet.grid import LensletGrid
 from lfstereo.lightfield import DecodeOptions, LightField, decode
 from lfstereo.lightfield.decoding import view_count
+from lfstereo.lightfield.fine_rows import Interpolation
 from lfstereo.lightfield.hexagons import PHASES, hexagon_weights
 from lfstereo.lightfield.options import ViewOptions
 from lfstereo.lightfield.resample import LensletImage, offsets_inside, sample_views, view_columns, view_sampling
+from lfstereo.progress import silent
 
 PARALLAX = 3.5
 """Px on the lattice per px inside the micro-image: slope 3.5 * 0.884 / 12.38 = 0.25 view px per view."""
@@ -119,6 +121,8 @@ def test_number_of_views_follows_the_micro_images(pitch: float, count: int) -> N
     [
         (ViewOptions(views=4), "found 4, expected an odd number"),
         (ViewOptions(views=-3), "found -3, expected an odd number"),
+        (ViewOptions(upsampling=5), "upsampling: found 5, expected 1 to 4"),
+        (ViewOptions(upsampling=0), "upsampling: found 0, expected 1 to 4"),
         (ViewOptions(view_step_px=0.0), r"view_step_px: found 0, expected 0\.1 to 10"),
         (ViewOptions(view_step_px=float("nan")), "view_step_px: found nan"),
     ],
@@ -162,17 +166,25 @@ def grid_of(pitch: float, rotation: float = 0.0, shifted: int = 1, rows: int = 2
 
 @pytest.mark.parametrize("shifted", [0, 1])
 @pytest.mark.parametrize("rotation", [0.0, 0.01])
-def test_sampling_tells_where_a_view_pixel_lies(shifted: int, rotation: float) -> None:
+@pytest.mark.parametrize(
+    ("upsampling", "interpolation"),
+    [(1, "kriging"), (1, "barycentric"), (2, "kriging"), (3, "barycentric"), (3, "kriging")],
+)
+def test_sampling_tells_where_a_view_pixel_lies(
+    shifted: int, rotation: float, upsampling: int, interpolation: Interpolation
+) -> None:
     """Sample an image whose red is its own x and whose green is its own y: exact, as cubics keep straight lines."""
     grid = grid_of(14.3, rotation, shifted)
     y, x = np.mgrid[:300, :400].astype(np.float32)
     image = np.stack([x, y, np.ones_like(x)], axis=2)
-    sampling = view_sampling(grid, 0.884)
+    sampling = view_sampling(grid, 0.884, upsampling)
     read = LensletImage(image, grid.centres(), offsets_inside(grid, sampling, 3))
-    views, weight = sample_views(read, np.ones((300, 400), np.float32), grid, sampling, 3)
+    lit = np.ones((300, 400), np.float32)
+    views, weight = sample_views(read, lit, grid, sampling, 3, silent, upsampling, interpolation)
+    assert views.shape[2:4] == (20 * upsampling, 28 * upsampling)
     light_field = LightField(views, weight, sampling, "", "test")
     true_x, true_y = view_positions(light_field)
-    inner = (slice(2, -2), slice(3, -3))
+    inner = (slice(2 * upsampling, -2 * upsampling), slice(3 * upsampling, -3 * upsampling))
     cos, sin = np.cos(rotation), np.sin(rotation)
     for t, s in ((1, 1), (0, 2), (2, 1)):
         dx, dy = 0.884 * (s - 1), 0.884 * (t - 1)
@@ -193,6 +205,22 @@ def test_weight_is_zero_off_the_sensor() -> None:
 
 def test_view_columns_of_the_illum() -> None:
     assert view_columns(grid_of(14.3, rows=434, columns=541)) == 625
+
+
+def test_upsampled_views_show_finer_steps_of_the_same_scene(draw_frame: Callable[..., Any], white: Capture) -> None:
+    frame = draw_frame(scene=texture, parallax=PARALLAX, noise=0.0).capture
+    errors = {}
+    for interpolation in ("kriging", "barycentric"):
+        options = DecodeOptions(view=ViewOptions(views=3, upsampling=2, interpolation=interpolation))  # type: ignore[arg-type]
+        found = decode(frame, white, options)
+        assert found.views.shape == (3, 3, 64, 72, 3)
+        assert found.weight is not None and found.weight[1, 1, 6:-8, 6:-6].min() > 240
+        x, y = view_positions(found)
+        inner = (slice(6, -8), slice(6, -6))
+        seen = found.views[1, 2, ..., 1][inner] * 959 / 700
+        errors[interpolation] = np.sqrt(np.mean((seen - texture(x + PARALLAX * 0.884, y)[inner]) ** 2))
+    assert errors["kriging"] < 0.008
+    assert errors["barycentric"] < 0.03
 
 
 def test_hexagon_weights_are_symmetric_and_sum_to_one() -> None:
