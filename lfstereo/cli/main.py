@@ -32,6 +32,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "picture": ("lfstereo.cli.picture", "a perspective, an epipolar-plane image or a quilt of a light field"),
     "animate": ("lfstereo.cli.animate", "focal sweep or parallax orbit of a light field as GIF or MP4"),
     "run": ("lfstereo.cli.run", "two captures to disparity, depth, all-in-focus image and point cloud"),
+    "depth": ("lfstereo.cli.depth", "focus sweeps of ordinary cameras, one or two, to depth"),
     "batch": ("lfstereo.cli.batch", "every stereo pair under a folder to depth, on many cores or a cluster"),
     "view": ("lfstereo.cli.view", "look at results and light fields in the browser, refocus them live"),
     "synthesize": (

@@ -10,7 +10,7 @@ import numpy as np
 
 from lfstereo.arrays import Bool, Float32, Float64
 from lfstereo.errors import AlignmentError, ConfigError
-from lfstereo.focus.evangelidis2008 import align_homography, align_scale
+from lfstereo.focus.evangelidis2008 import align_homography, align_scale, correlation_of
 from lfstereo.focus.nayar1992 import LUMA
 from lfstereo.focus.sweep import FocusSweep
 from lfstereo.options import option
@@ -27,6 +27,8 @@ _WORKING_WIDTH_PX = 1000
 _COARSEST_PX = 60
 _STILL_PX = 0.05
 """A picture that moves less anywhere is left as it is: resampling would cost more than it mends."""
+_LEAST_GAIN = 0.1
+"""Of what neighbours lack in correlation, that a transform must mend; a change of blur alone leaves about so much."""
 _LEAST_MATCHES = 12
 _RATIO = 0.75
 _RANSAC_PX = 2.0
@@ -116,6 +118,9 @@ def _aligned(template: Float32, moved: Float32, model: Model, where: str) -> tup
             other, reached = _coarse_to_fine(template, moved, model, start)
             if reached > correlation:
                 found, correlation = other, reached
+    still = correlation_of(template, moved)
+    if 1 - correlation > (1 - _LEAST_GAIN) * (1 - still):
+        found, correlation = np.eye(3), still
     scale = float(np.sqrt(abs(np.linalg.det(found[:2, :2]))))
     centre = np.array([(template.shape[1] - 1) / 2, (template.shape[0] - 1) / 2, 1.0])
     place = found @ centre

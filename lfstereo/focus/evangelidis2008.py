@@ -14,6 +14,23 @@ _SMOOTH_PX = 5
 """Window of the Gaussian that both pictures are blurred by, odd."""
 
 
+def correlation_of(template: Float32, moved: Float32) -> float:
+    """Return the correlation of two ``(V, U)`` pictures as they are, blurred as for their alignment.
+
+    Examples
+    --------
+    Gain and offset do not matter.
+
+    >>> picture = np.random.default_rng(0).random((20, 30), dtype=np.float32)
+    >>> round(correlation_of(picture, 3 * picture + 1), 4)
+    1.0
+    """
+    fixed, free = (cv2.GaussianBlur(p, (_SMOOTH_PX, _SMOOTH_PX), 0).astype(np.float64) for p in (template, moved))
+    fixed, free = fixed - fixed.mean(), free - free.mean()
+    sizes = float(np.linalg.norm(fixed) * np.linalg.norm(free))
+    return float((fixed * free).sum()) / sizes if sizes > 0 else -1.0
+
+
 def align_homography(template: Float32, moved: Float32, start: Float64) -> tuple[Float64, float]:
     """Return the homography ``W`` with ``moved(W x)`` most like ``template(x)``, and their correlation.
 
