@@ -10,12 +10,17 @@ were fitted to 99 other surfaces under 2850, 4150 and 6500 K as a factory would.
 from __future__ import annotations
 
 import argparse
+import io
 import warnings
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from PIL import Image
 
 from lfstereo.arrays import Float64
+from lfstereo.container import Capture
+from lfstereo.container.jpeg_mosaic import restore_mosaic
 from lfstereo.container.metadata import FrameMetadata
 from lfstereo.develop.colour_spaces import conversion
 from lfstereo.develop.options import DevelopOptions
@@ -106,6 +111,29 @@ def grey_ramp(bench: Bench) -> None:
         print(f"    {level:6.2f}{value.mean():8.3f}{100 * np.ptp(value) / value.mean():7.1f}")
 
 
+def jpeg_mosaic(bench: Bench, colours: Float64, xyz: Float64) -> None:
+    """Print what is left of the chart after its mosaic was stored as a JPEG of 8 bits."""
+    meta = bench.metadata
+    raw = photograph_chart(colours, picture_filters(meta), meta, bench.camera, bench.options).mosaic
+    eight = np.rint(16 + (raw.astype(np.float64) - 64) / (1023 - 64) * (255 - 16)).clip(0, 255).astype(np.uint8)
+    red, green, _, blue = (1 / gain for gain in meta.white_balance)
+    white = {"r": red, "g": green, "b": blue}
+    b0, b1, b2, b3 = (white[colour] for colour in meta.bayer)
+    levels = replace(meta, black=(256.0,) * 4, white=(4080.0,) * 4, bits_per_pixel=16)
+    print("mosaic stored as JPEG: mean of the 24 patches in the centre view, as decompressed and restored")
+    for quality in (75, 90, 100):
+        stored = io.BytesIO()
+        Image.fromarray(eight).save(stored, "JPEG", quality=quality)
+        picture = Image.open(stored)
+        pixels, steps = np.array(picture), np.reshape(picture.quantization[0], (8, 8))  # type: ignore[attr-defined]
+        errors = []
+        for mosaic in (pixels.astype(np.float32), restore_mosaic(pixels, steps, 16.0, (b0, b1, b2, b3))):
+            numbers = np.rint(16 * mosaic).clip(0, 4080).astype(np.uint16)
+            views = views_from(Capture(numbers, levels, "jpeg"), bench.grid, bench.shading, DecodeOptions(develop=WIDE))
+            errors.append(difference(patch_means(views, bench.camera), xyz)[views.centre].mean())
+        print(f"    quality {quality:3d}: {errors[0]:.1f} and {errors[1]:.1f}")
+
+
 def main() -> None:
     """Print a block per chart."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -124,6 +152,8 @@ def main() -> None:
         name = f"measured sensitivities, {kelvin:.0f} K"
         report(name, bench, shot.responses, sensor_filters(metadata), metadata, shot.true_xyz)
     grey_ramp(bench)
+    if not full:
+        jpeg_mosaic(bench, srgb, xyz)
 
 
 if __name__ == "__main__":

@@ -17,6 +17,7 @@ from lfstereo.errors import AssetError, ContainerError
 from lfstereo.options import read_toml
 
 _FINER = 16
+"""Digital numbers per one of the file: 12 bits for what 8 cannot hold."""
 
 
 def camera_names() -> tuple[str, ...]:
@@ -112,10 +113,9 @@ def _restored(path: Path, pixels: UInt8, metadata: FrameMetadata) -> Capture:
     greens = (green_r, green_b) if metadata.bayer.index("r") < 2 else (green_b, green_r)
     white = [{"r": red, "b": blue, "g": greens[site // 2]}[colour] for site, colour in enumerate(metadata.bayer)]
     restored = restore_mosaic(pixels, steps, float(np.mean(metadata.black)), (white[0], white[1], white[2], white[3]))
-    black = tuple(_FINER * level for level in metadata.black)
-    highest = tuple(_FINER * level for level in metadata.white)
-    mosaic = np.clip(np.rint(_FINER * restored), 0, max(highest)).astype(np.uint16)
-    finer = replace(metadata, black=black, white=highest, bits_per_pixel=16, endianness="little")
+    (b0, b1, b2, b3), (w0, w1, w2, w3) = _FINER * np.array([metadata.black, metadata.white])
+    mosaic = np.clip(np.rint(_FINER * restored), 0, max(w0, w1, w2, w3)).astype(np.uint16)
+    finer = replace(metadata, black=(b0, b1, b2, b3), white=(w0, w1, w2, w3), bits_per_pixel=16, endianness="little")
     return Capture(mosaic=mosaic, metadata=finer, source=str(path))
 
 
