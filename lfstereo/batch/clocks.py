@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -68,14 +68,14 @@ def pair_by_time(
     (((0, 0), (1, 1), (2, 2)), 100.0)
     """
     left, right = np.asarray(left_s, np.float64), np.asarray(right_s, np.float64)
-    everyone = {"lonely_left": tuple(range(len(left))), "lonely_right": tuple(range(len(right)))}
+    everyone = TimeMatches(None, lonely_left=tuple(range(len(left))), lonely_right=tuple(range(len(right))))
     if not len(left) or not len(right):
-        return TimeMatches(None, **everyone, reason="there is no capture of the other camera")
+        return replace(everyone, reason="there is no capture of the other camera")
     given = offset_s is not None
     if offset_s is None:
         offset_s, doubt = _estimate(left, right, tolerance_s)
         if doubt:
-            return TimeMatches(None, **everyone, reason=f"{doubt}; give --clock-offset-s")
+            return replace(everyone, reason=f"{doubt}; give --clock-offset-s")
     pairs, ambiguous = _match(left, right, tolerance_s, offset_s)
     off = np.array([right[j] - left[i] for i, j in pairs])
     middle = float(np.median(off)) if len(off) and not given else offset_s

@@ -171,8 +171,6 @@ def _has_cuda(device: str) -> bool:
 
 def _camera_jobs(request: BatchRequest, plan: Plan) -> list[CameraJob]:
     """Return one job per white image that the pairs need, so that its grid is fitted once."""
-    if request.whites is None:
-        return []
     cameras: dict[object, CaptureFile] = {}
     for pair in plan.to_do:
         for capture in (pair.files.left, pair.files.right):

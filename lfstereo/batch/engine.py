@@ -11,7 +11,7 @@ from typing import Any
 
 from lfstereo.batch.attempts import DISK_FULL, verdict_on_loss
 from lfstereo.batch.crew import Crew, Step
-from lfstereo.batch.jobs import Job, Outcome
+from lfstereo.batch.jobs import Job, Outcome, together
 from lfstereo.batch.notes import TIME_LIMIT, Note, read_note
 
 _TICK_S = 1.0
@@ -105,7 +105,7 @@ class Engine:
             lost = read_note(job.note)
             verdict = verdict_on_loss(replace(job, retries=0), lost) if lost and lost.token == job.token else None
             outcome = verdict or Outcome(job.name, "failed", f"worker: {words}", type(error).__name__)
-        outcome = _together(flight.before, outcome)
+        outcome = together(flight.before, outcome)
         if outcome.kind == DISK_FULL:
             self._stopped = outcome.reason
         if outcome.state == "focused":
@@ -128,7 +128,7 @@ class Engine:
             self._waiting[flight.at].appendleft(flight)
         else:
             job.note.unlink(missing_ok=True)
-            self._ended(_together(flight.before, verdict))
+            self._ended(together(flight.before, verdict))
 
     def _look_after(self) -> None:
         """Read the workers' notes; end a worker that is over its time and did not end itself."""
@@ -142,17 +142,3 @@ class Engine:
             if time.monotonic() - since > flight.job.time_limit_s + _GRACE_S:
                 self._crew.stop(note)
         self._tick(notes)
-
-
-def _together(first: Outcome | None, last: Outcome) -> Outcome:
-    """Return the outcome of a pair over both steps."""
-    if first is None:
-        return last
-    return replace(
-        last,
-        inputs=first.inputs | last.inputs,
-        seconds=first.seconds | last.seconds,
-        peak_gib=max(first.peak_gib, last.peak_gib),
-        attempt=max(first.attempt, last.attempt),
-        workers=(*first.workers, *last.workers),
-    )

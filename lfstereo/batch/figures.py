@@ -53,7 +53,7 @@ def write_thumbnail(folder: Path) -> None:
     """Put the all-in-focus image and the coloured disparity of a result folder side by side, small."""
     parts = []
     for name in ("all_in_focus.png", "disparity_colour.png"):
-        picture = cv2.imread(str(folder / name))
+        picture = np.asarray(cv2.imread(str(folder / name)))
         width = max(1, round(picture.shape[1] * _THUMBNAIL_HEIGHT_PX / picture.shape[0]))
         parts.append(cv2.resize(picture, (width, _THUMBNAIL_HEIGHT_PX), interpolation=cv2.INTER_AREA))
     encoded = cv2.imencode(".jpg", np.hstack(parts), [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY])[1]

@@ -1,26 +1,21 @@
-"""What a worker keeps from one pair to the next: networks, and the grid and shading of its cameras."""
+"""What a worker keeps from one pair to the next: networks, and what its cameras' captures are decoded with."""
 
 from __future__ import annotations
 
-import hashlib
-import json
+import warnings
 from collections import OrderedDict
-from dataclasses import asdict, dataclass, field
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from lfstereo import __version__
-from lfstereo.arrays import Float32
-from lfstereo.batch.jobs import WORK_FOLDER
 from lfstereo.batch.stamps import FileStamp, stamp
 from lfstereo.container import Capture
 from lfstereo.container.metadata import FrameMetadata
-from lfstereo.develop.shading import shading_from_white_image
-from lfstereo.lenslet.grid import LensletGrid
+from lfstereo.errors import GridFitError
+from lfstereo.lenslet.drift import measure_drift
 from lfstereo.lenslet.options import GridOptions
-from lfstereo.lenslet.white import find_white_image
-from lfstereo.lightfield.decoding import calibrate
-from lfstereo.outputs import atomic_file
+from lfstereo.lightfield.calibration import LensletCalibration, calibrate_photograph
 from lfstereo.progress import Progress, silent
 
 if TYPE_CHECKING:
@@ -28,17 +23,16 @@ if TYPE_CHECKING:
 
 _CAMERAS_HELD = 2
 """The left and the right one; more would cost 170 MB each."""
-_CameraKey = tuple[Path, str, int, int, int, int]
 
 
 @dataclass(frozen=True, slots=True)
 class HeldCamera:
-    """A white image, made into what the decode needs."""
+    """What captures of one camera at one zoom and focus are decoded with."""
 
-    white: FileStamp
-    grid: LensletGrid
-    shading: Float32
-    """``(H, W)`` relative illumination, 1 = full light."""
+    calibration: LensletCalibration
+    """Without the white image itself, of which nothing more is needed."""
+    white: FileStamp | None
+    """The white image's file; ``None`` where the photograph had to do, or where it lies in an archive."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +40,7 @@ class Held:
     """Of one worker process."""
 
     networks: dict[tuple[str, str], Network] = field(default_factory=dict)
-    cameras: OrderedDict[_CameraKey, HeldCamera] = field(default_factory=OrderedDict)
+    cameras: OrderedDict[object, HeldCamera] = field(default_factory=OrderedDict)
 
     def network(self, model: str, device: Literal["auto", "cpu", "cuda"]) -> Network:
         """Return a network, loaded once."""
@@ -56,42 +50,51 @@ class Held:
             self.networks[model, device] = load_network(model, device)
         return self.networks[model, device]
 
-    def camera(self, capture: Capture, whites: Path, output: Path, progress: Progress = silent) -> HeldCamera:
-        """Return grid and shading for a capture; the grid of a white image is fitted once in a batch."""
-        key = camera_key(capture.metadata, whites)
-        if key not in self.cameras:
+    def camera(
+        self, capture: Capture, whites: Path | None, warn: Callable[[str], None], progress: Progress = silent
+    ) -> HeldCamera:
+        """Return what to decode a capture with: what served the camera before, if it fits this capture too.
+
+        Parameters
+        ----------
+        capture
+            The photograph; its own micro-images decide whether a grid fits.
+        whites
+            As in `lfstereo.lightfield.calibration.calibrate_photograph`.
+        warn
+            Told what the user must know of the grid.
+        progress
+            Told of the work done.
+        """
+        key, options = camera_key(capture.metadata, whites), GridOptions()
+        known = self.cameras.get(key)
+        if known is not None and _fits(known, capture, options):
+            self.cameras.move_to_end(key)
+            return known
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            found = calibrate_photograph(capture, whites, options, progress)
+        for warning in caught:
+            warn(str(warning.message))
+        file = Path(found.white.source) if found.white else None
+        camera = HeldCamera(replace(found, white=None), stamp(file) if file and file.is_file() else None)
+        if found.white is not None:
             while len(self.cameras) >= _CAMERAS_HELD:
                 self.cameras.popitem(last=False)
-            self.cameras[key] = _prepared(capture, whites, output, progress)
-        self.cameras.move_to_end(key)
-        return self.cameras[key]
+            self.cameras[key] = camera
+        return camera
 
 
-def camera_key(metadata: FrameMetadata, whites: Path) -> _CameraKey:
+def camera_key(metadata: FrameMetadata, whites: Path | None) -> object:
     """Return what decides which white image belongs to a capture."""
     lens = metadata.lens
-    return whites, metadata.serial, metadata.width, metadata.height, lens.zoom_step, lens.focus_step
+    size = metadata.width, metadata.height
+    return whites, metadata.serial, size, lens.zoom_step, lens.focus_step, metadata.geometry_ref
 
 
-def _prepared(capture: Capture, whites: Path, output: Path, progress: Progress) -> HeldCamera:
-    white = find_white_image(whites, capture.metadata)
-    found = stamp(Path(white.source))
-    options = GridOptions()
-    made_with = f"{found.sha256} {options} {__version__}"
-    stored = output / WORK_FOLDER / "grids" / f"{hashlib.sha256(made_with.encode()).hexdigest()[:24]}.json"
-    grid = _read_grid(stored)
-    if grid is not None:
-        return HeldCamera(found, grid, shading_from_white_image(white))
-    grid, shading = calibrate(capture, white, options, progress)
-    stored.parent.mkdir(parents=True, exist_ok=True)
-    with atomic_file(stored, force=True) as scratch:
-        scratch.write_text(json.dumps(asdict(grid)), "utf-8")
-    return HeldCamera(found, grid, shading)
-
-
-def _read_grid(path: Path) -> LensletGrid | None:
+def _fits(camera: HeldCamera, capture: Capture, options: GridOptions) -> bool:
     try:
-        values = json.loads(path.read_text("utf-8"))
-        return LensletGrid(**{name: tuple(v) if isinstance(v, list) else v for name, v in values.items()})
-    except (OSError, ValueError, TypeError):
-        return None
+        drift = measure_drift(capture, camera.calibration.grid, options)
+    except GridFitError:
+        return False
+    return drift.offset_px <= options.largest_offset_px

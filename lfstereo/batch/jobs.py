@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal, TypeAlias
 
@@ -11,7 +11,7 @@ from lfstereo.batch.stamps import FileStamp
 from lfstereo.pipeline import RunOptions
 
 WORK_FOLDER = ".batch"
-"""Hidden folder in the output: notes of running workers, lenslet grids, focal stacks on their way."""
+"""Hidden folder in the output: notes of running workers, focal stacks on their way."""
 State = Literal["done", "focused", "failed"]
 
 
@@ -39,7 +39,7 @@ class CameraJob(Job):
     """Fit the lenslet grid of one camera before its captures come."""
 
     capture: Path
-    whites: Path
+    whites: Path | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,12 +77,29 @@ class Outcome:
     inputs: dict[str, FileStamp] = field(default_factory=dict)
     """Files that the result was made from, by role."""
     weights_sha256: str = ""
+    warnings: tuple[str, ...] = ()
+    """What the user must know of a result, one line each."""
     figures: dict[str, float] = field(default_factory=dict)
     seconds: dict[str, float] = field(default_factory=dict)
     peak_gib: float = 0.0
     attempt: int = 1
     workers: tuple[str, ...] = ()
     """``host:process`` of each step."""
+
+
+def together(first: Outcome | None, last: Outcome) -> Outcome:
+    """Return the outcome of a pair over two of its steps."""
+    if first is None:
+        return last
+    return replace(
+        last,
+        inputs=first.inputs | last.inputs,
+        warnings=(*first.warnings, *last.warnings),
+        seconds=first.seconds | last.seconds,
+        peak_gib=max(first.peak_gib, last.peak_gib),
+        attempt=max(first.attempt, last.attempt),
+        workers=(*first.workers, *last.workers),
+    )
 
 
 Work: TypeAlias = Callable[[PairJob], Outcome]

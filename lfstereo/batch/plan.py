@@ -130,8 +130,8 @@ def _white_now(known: FileStamp, whites: Path | None) -> FileStamp:
     path = Path(known.path)
     if path.exists() or whites is None:
         return stamp(path, known)
-    moved = [stamp(found) for found in whites.rglob(path.name)]
-    return next((found for found in moved if found.sha256 == known.sha256), stamp(path, known))
+    moved = next((found for file in whites.rglob(path.name) if (found := stamp(file)).sha256 == known.sha256), None)
+    return moved or stamp(path, known)
 
 
 def _difference(

@@ -45,7 +45,7 @@ class WorkerPool(Executor):
             future = self._pools[index].submit(fn, *args, **kwargs)
         held = self._held[index]
         held.add(future)  # type: ignore[arg-type]
-        future.add_done_callback(held.discard)  # type: ignore[arg-type]
+        future.add_done_callback(held.discard)
         return future
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:

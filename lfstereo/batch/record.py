@@ -107,12 +107,15 @@ def _ends_with_newline(file: Any) -> bool:
 
 
 def _parsed(line: dict[str, Any]) -> Entry:
-    own = {name: line[name] for name in ("written", "fingerprint", "options", "program") if name in line}
-    names = set(Outcome.__dataclass_fields__) - {"name", "inputs", "workers"}
+    own: dict[str, Any] = {
+        name: line[name] for name in ("written", "fingerprint", "options", "program") if name in line
+    }
+    names = set(Outcome.__dataclass_fields__) - {"name", "inputs", "workers", "warnings"}
     outcome = Outcome(
         name=str(line["pair"]),
         inputs={role: FileStamp(**values) for role, values in line.get("inputs", {}).items()},
         workers=tuple(line.get("workers", ())),
+        warnings=tuple(line.get("warnings", ())),
         **{name: line[name] for name in names if name in line},
     )
-    return Entry(outcome, **({"fingerprint": ""} | own))
+    return Entry(outcome, **{"fingerprint": "", **own})

@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from lfstereo.container.capture import BARE_SUFFIX, SIDECAR_SUFFIXES
+from lfstereo.lenslet.home import library_folder
 from lfstereo.network.shipped import CARD, find_model
 from lfstereo.options import read_toml
 from lfstereo.pipeline import RunOptions
@@ -68,10 +68,14 @@ def counted_options(options: RunOptions) -> dict[str, Any]:
 
 
 def white_listing(whites: Path | None) -> str:
-    """Return a sha256 of the names and sizes of the white images, so that a new one, maybe a nearer one, is noticed."""
-    if whites is None:
+    """Return a sha256 of the names and sizes of the white images, so that a new one, maybe a nearer one, is noticed.
+
+    Without a folder it is of those imported before.
+    """
+    whites = whites or library_folder()
+    if not whites.exists():
         return ""
-    files = [whites] if whites.is_file() else sorted(p for p in whites.rglob("*") if _is_white(p))
+    files = [whites] if whites.is_file() else sorted(p for p in whites.rglob("*") if p.is_file())
     lines = [f"{path.relative_to(whites).as_posix()} {path.stat().st_size}" for path in files]
     return hashlib.sha256("\n".join(lines).encode()).hexdigest()
 
@@ -87,7 +91,3 @@ def model_sha256(model: str) -> str:
         If its card is damaged.
     """
     return str(read_toml(find_model(model) / CARD).get("sha256", ""))
-
-
-def _is_white(path: Path) -> bool:
-    return path.suffix.lower() in {BARE_SUFFIX, *(suffix.lower() for suffix in SIDECAR_SUFFIXES)}

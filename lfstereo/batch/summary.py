@@ -71,15 +71,26 @@ def _csv(rows: Sequence[SummaryRow]) -> str:
     names = _figure_names(rows)
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(["pair", "state", "reason", "attempt", "seconds", "peak_gib", "points", *names])
+    writer.writerow(["pair", "state", "reason", "attempt", "seconds", "peak_gib", "points", *names, "warnings"])
     for row in rows:
         found = row.entry.outcome if row.entry else None
         if found is None or row.state == "not done":
-            writer.writerow([row.name, row.state, *[""] * (5 + len(names))])
+            writer.writerow([row.name, row.state, *[""] * (6 + len(names))])
             continue
         figures = [found.figures.get(name, "") for name in ("points", *names)]
         seconds = round(sum(found.seconds.values()), 2)
-        writer.writerow([row.name, row.state, found.reason, found.attempt, seconds, found.peak_gib, *figures])
+        writer.writerow(
+            [
+                row.name,
+                row.state,
+                found.reason,
+                found.attempt,
+                seconds,
+                found.peak_gib,
+                *figures,
+                "; ".join(found.warnings),
+            ]
+        )
     return text.getvalue()
 
 
@@ -92,7 +103,7 @@ def _html(rows: Sequence[SummaryRow], leftovers: Sequence[Leftover]) -> str:
         f"<style>{_STYLE}</style><h1>lfstereo batch</h1>",
         f"<p>{', '.join(f'{count} {state}' for state, count in counts.items())}</p>",
         "<table><tr><th class='text'>pair</th><th class='text'>all in focus, disparity</th>",
-        "".join(f"<th>{escape(head)}</th>" for head in heads) + "</tr>",
+        "".join(f"<th>{escape(head)}</th>" for head in heads) + "<th class='text'>warnings</th></tr>",
         *(_html_row(row, names) for row in rows),
         "</table>",
     ]
@@ -113,13 +124,14 @@ def _html_row(row: SummaryRow, names: Sequence[str]) -> str:
     found = row.entry.outcome if row.entry else None
     if found is None or row.state != "done":
         reason = escape(found.reason) if found and row.state == "failed" else row.state
-        cells = f"<td class='text'>{name}</td><td class='text' colspan='{3 + len(names)}'>{reason}</td>"
+        cells = f"<td class='text'>{name}</td><td class='text' colspan='{4 + len(names)}'>{reason}</td>"
         return f"<tr class='failed'>{cells}</tr>"
     link = quote(row.name)
     cells = f"<td class='text'><a href='{link}/overview.png'>{name}</a></td>"
     cells += f"<td class='text'><img loading='lazy' alt='' src='{link}/{THUMBNAIL}'></td>"
     cells += f"<td>{sum(found.seconds.values()):.1f}</td><td>{found.peak_gib:.2f}</td>"
     cells += "".join(f"<td>{_shown(found.figures.get(figure))}</td>" for figure in names)
+    cells += f"<td class='text'>{escape('; '.join(found.warnings))}</td>"
     return f"<tr>{cells}</tr>"
 
 

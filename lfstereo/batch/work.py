@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import os
-from dataclasses import replace
 from pathlib import Path
 
 from lfstereo.batch.attempts import NotingClock, attempt, check_not_superseded
 from lfstereo.batch.figures import quality_figures, write_thumbnail
 from lfstereo.batch.handover import read_focused, write_focused
 from lfstereo.batch.held import Held
-from lfstereo.batch.jobs import CameraJob, Outcome, PairJob
-from lfstereo.batch.stamps import FileStamp, stamp
+from lfstereo.batch.jobs import CameraJob, Outcome, PairJob, together
+from lfstereo.batch.stamps import stamp
 from lfstereo.container import read_capture
-from lfstereo.lightfield.decoding import views_from
+from lfstereo.lightfield.calibration import decode_with
 from lfstereo.lightfield.field import LightField
 from lfstereo.outputs import atomic_folder
 from lfstereo.pipeline import (
@@ -54,48 +53,51 @@ def match_only(job: PairJob) -> Outcome:
 
 def _prepare_camera(job: CameraJob, clock: NotingClock) -> Outcome:
     with clock.stage("lenslet grid") as progress:
-        _HELD.camera(read_capture(job.capture), job.whites, job.output, progress)
+        _HELD.camera(read_capture(job.capture), job.whites, _nobody, progress)
     return Outcome(job.name, "done")
 
 
 def _convert_pair(job: PairJob, clock: NotingClock) -> Outcome:
-    focused, inputs = _focus(job, clock)
-    return _match(job, focused, inputs, clock)
+    focused, before = _focus(job, clock)
+    return together(before, _match(job, focused, clock))
 
 
 def _focus_only(job: PairJob, clock: NotingClock) -> Outcome:
-    focused, inputs = _focus(job, clock)
+    focused, outcome = _focus(job, clock)
     with clock.stage("hand over"):
         write_focused(job.focused, focused)
-    return Outcome(job.name, "focused", inputs=inputs)
+    return outcome
 
 
 def _match_only(job: PairJob, clock: NotingClock) -> Outcome:
     with clock.stage("take over"):
         focused = read_focused(job.focused, read_rig(job.rig))
-    outcome = _match(job, focused, {}, clock)
+    outcome = _match(job, focused, clock)
     job.focused.unlink(missing_ok=True)
     return outcome
 
 
-def _focus(job: PairJob, clock: NotingClock) -> tuple[FocusedPair, dict[str, FileStamp]]:
+def _focus(job: PairJob, clock: NotingClock) -> tuple[FocusedPair, Outcome]:
     rig = read_rig(job.rig)
+    warnings: list[str] = []
     inputs = {"left": stamp(job.left), "right": stamp(job.right), "rig": stamp(job.rig)}
     if job.truth is not None:
         inputs["truth"] = stamp(job.truth / "disparity.pfm")
 
     def opened(path: Path, progress: Progress) -> LightField:
-        if job.whites is None or path.suffix.lower() not in CAPTURE_SUFFIXES:
+        if path.suffix.lower() not in CAPTURE_SUFFIXES:
             return open_light_field(path, job.whites, progress)
         capture = read_capture(path)
-        camera = _HELD.camera(capture, job.whites, job.output)
-        inputs[f"white {'left' if path == job.left else 'right'}"] = camera.white
-        return views_from(capture, camera.grid, camera.shading, progress=progress)
+        camera = _HELD.camera(capture, job.whites, warnings.append)
+        if camera.white is not None:
+            inputs[f"white {'left' if path == job.left else 'right'}"] = camera.white
+        return decode_with(capture, camera.calibration, progress=progress)
 
-    return focus_pair(job.left, job.right, rig, opened, job.options, clock), inputs
+    focused = focus_pair(job.left, job.right, rig, opened, job.options, clock)
+    return focused, Outcome(job.name, "focused", inputs=inputs, warnings=tuple(warnings))
 
 
-def _match(job: PairJob, focused: FocusedPair, inputs: dict[str, FileStamp], clock: NotingClock) -> Outcome:
+def _match(job: PairJob, focused: FocusedPair, clock: NotingClock) -> Outcome:
     with clock.stage("load network"):
         network = _HELD.network(job.options.model, job.options.device)
         check_slices(job.options, network)
@@ -109,8 +111,11 @@ def _match(job: PairJob, focused: FocusedPair, inputs: dict[str, FileStamp], clo
             _to_disk(out)
         check_not_superseded(job, clock)
     _to_disk(job.output, deep=False)
-    outcome = Outcome(job.name, "done", inputs=inputs, weights_sha256=network.card.sha256)
-    return replace(outcome, figures=quality_figures(report, result))
+    return Outcome(job.name, "done", weights_sha256=network.card.sha256, figures=quality_figures(report, result))
+
+
+def _nobody(warning: str) -> None:
+    """Leave the warning to the pair."""
 
 
 def _to_disk(folder: Path, deep: bool = True) -> None:
