@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 
 from lfstereo.arrays import Float32, UInt16
@@ -15,7 +17,7 @@ from lfstereo.lenslet.options import GridOptions
 from lfstereo.lenslet.remembered_grid import remembered_grid
 from lfstereo.lightfield.field import LightField
 from lfstereo.lightfield.lftoolbox import decode_as_lftoolbox
-from lfstereo.lightfield.micro_images import read_micro_images
+from lfstereo.lightfield.micro_images import MicroImages, micro_image_operators
 from lfstereo.lightfield.options import DecodeOptions, ViewOptions
 from lfstereo.lightfield.resample import LensletImage, LensletReader, offsets_inside, sample_views, view_sampling
 from lfstereo.progress import Progress, silent
@@ -122,9 +124,11 @@ def views_from(
     offsets = offsets_inside(grid, sampling, count)
     read: LensletReader
     if options.develop.demosaic == "micro-images":
-        matrix = output_matrix(capture.metadata, options.develop)
-        mosaic = develop_mosaic(capture, shading, options.develop, hot_pixels)
-        read = read_micro_images(mosaic, shading, grid, offsets, capture.metadata.bayer, matrix)
+        bayer, matrix = capture.metadata.bayer, output_matrix(capture.metadata, options.develop)
+        with ThreadPoolExecutor(max_workers=1) as beside:
+            mosaic = beside.submit(develop_mosaic, capture, shading, options.develop, hot_pixels)
+            operators = micro_image_operators(grid, offsets, bayer, matrix)
+        read = MicroImages(mosaic.result(), shading, grid.centres(), operators)
     else:
         picture = develop(capture, shading, options.develop, hot_pixels, grid)
         read = LensletImage(picture, grid.centres(), offsets)

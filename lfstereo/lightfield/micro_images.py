@@ -44,7 +44,7 @@ _TABLE_STEP_PX = 1 / 128
 
 @dataclass(frozen=True, slots=True)
 class MicroImages:
-    """A developed mosaic with, for each phase, the operator that reads the views from a micro-image."""
+    """A developed mosaic and what reads the views from its micro-images, a :class:`LensletReader`."""
 
     mosaic: Float32
     """``(H, W)`` devignetted and white balanced, greys equal in all colours."""
@@ -53,7 +53,7 @@ class MicroImages:
     centres: Float64
     """``(rows, columns, 2)`` (x, y) px of the lenslets."""
     operators: dict[int, Operator]
-    """By phase."""
+    """By phase, from :func:`micro_image_operators`."""
 
     def __call__(self, start: int, stop: int, values: Float32) -> Index:
         """Read the views' colours at the lenslets of some rows of the grid.
@@ -95,10 +95,8 @@ class Operator:
     """``(P, 3 N)``, colours running fastest; a light that is even in each colour comes out exactly."""
 
 
-def read_micro_images(
-    mosaic: Float32, shading: Float32, grid: LensletGrid, offsets: Float64, bayer: str, matrix: Float64
-) -> MicroImages:
-    """Prepare to read all colours of all views at every lenslet, straight from the mosaic.
+def micro_image_operators(grid: LensletGrid, offsets: Float64, bayer: str, matrix: Float64) -> dict[int, Operator]:
+    """Return, by phase, what reads all colours of all views from a micro-image, straight from the mosaic.
 
     Each micro-image's samples of all colours are weighted at once, by the best linear unbiased estimate for light
     fields of limited slope whose colours resemble each other. So there is no demosaic of the mosaic as if it were a
@@ -107,10 +105,6 @@ def read_micro_images(
 
     Parameters
     ----------
-    mosaic
-        ``(H, W)`` float32 developed mosaic: devignetted and white balanced, greys equal in all colours.
-    shading
-        ``(H, W)`` float32 relative illumination of its pixels, 1 = full light.
     grid
         The lenslet grid.
     offsets
@@ -128,8 +122,7 @@ def read_micro_images(
     Gunturk, Altunbasak, Mersereau, "Color plane interpolation using alternating projections" (IEEE TIP 2002):
     fine detail is nearly the same in all colours.
     """
-    centres = grid.centres()
-    phases = np.unique(_cells(centres)[1])
+    phases = np.unique(_cells(grid.centres())[1])
     pitch = float(np.hypot(*grid.step_u_px))
     angle = float(np.arctan2(grid.step_u_px[1], grid.step_u_px[0]))
 
@@ -139,8 +132,7 @@ def read_micro_images(
 
     # Many small products side by side: each stays on its own thread.
     with threadpool_limits(1, user_api="blas"), ThreadPoolExecutor(max_workers=os.cpu_count() or 1) as pool:
-        operators = dict(zip(phases.tolist(), pool.map(operator, phases), strict=True))
-    return MicroImages(mosaic, shading, centres, operators)
+        return dict(zip(phases.tolist(), pool.map(operator, phases), strict=True))
 
 
 def micro_image_operator(
@@ -170,13 +162,12 @@ def micro_image_operator(
     system, common = _covariances(pixels, colours, offsets + centre, _covariance_table())
     system[np.diag_indices(count)] += _NOISE / lit**2 + _LEAKAGE * foreign**2
     inverse = np.linalg.inv(system)[:count]
-    shared = inverse[:, :count] @ common
-    weights: Float32 = np.empty((count, common.shape[1], 3), np.float32)
-    for colour in range(3):
-        own = np.flatnonzero(colours == colour)
-        weights[..., colour] = shared + _COLOUR_SHARE * inverse[:, own] @ common[own] + inverse[:, count + colour, None]
-    turned = weights.reshape(-1, 3) @ matrix.T.astype(np.float32)
-    return Operator(pixels, _inner_neighbours(pixels, centre), turned.reshape(count, -1))
+    # What a pixel shares with each of the views' colours, after the matrix.
+    shared = (1 + _COLOUR_SHARE * (colours[:, None, None] == np.arange(3))) @ matrix.T
+    right = (common[..., None] * shared).reshape(count, -1)
+    even = np.tile(inverse[:, count:] @ matrix.T, len(offsets))
+    weights = np.asarray(inverse[:, :count] @ right + even, np.float32)
+    return Operator(pixels, _inner_neighbours(pixels, centre), weights)
 
 
 def _cells(centres: Float64) -> tuple[Index, Index]:

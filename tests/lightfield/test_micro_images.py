@@ -7,7 +7,7 @@ import pytest
 
 from lfstereo.lenslet.grid import LensletGrid
 from lfstereo.lightfield.fine_rows import PHASES, fine_weights
-from lfstereo.lightfield.micro_images import micro_image_operator, read_micro_images
+from lfstereo.lightfield.micro_images import MicroImages, micro_image_operator, micro_image_operators
 
 PITCH = 14.3
 BAYERS = ["grbg", "rggb", "bggr", "gbrg"]
@@ -33,7 +33,8 @@ def views_of(picture: np.ndarray, bayer: str, grid: LensletGrid, **changes: np.n
     """Return ``(rows, columns, N, 3)`` of a picture that has all colours on every pixel of the sensor."""
     mosaic = changes["mosaic"] if "mosaic" in changes else mosaic_of(picture, bayer)
     shading = changes.get("shading", np.ones(mosaic.shape, np.float32))
-    read = read_micro_images(mosaic, shading, grid, OFFSETS, bayer, changes.get("matrix", PRINCIPAL))
+    operators = micro_image_operators(grid, OFFSETS, bayer, changes.get("matrix", PRINCIPAL))
+    read = MicroImages(mosaic, shading, grid.centres(), operators)
     values = np.empty((grid.rows * grid.columns, 3 * len(OFFSETS)), np.float32)
     places = read(0, grid.rows, values)
     return values[places].reshape(grid.rows, grid.columns, -1, 3)
