@@ -4,8 +4,9 @@ Keys of a page's content
     ``title`` parts of the heading; ``lede`` the line below; ``made`` by what; ``size`` (V, U) of all pictures;
     ``turbo`` colours of disparity; ``pictures`` by name; ``slices`` near to far with the disparity in focus; ``views``
     with their place (s, t) in the pupil; ``disparity`` codes and valid bits; ``doubt`` codes, 255 = no answer;
-    ``geometry`` that turns px into metres; ``axis`` of the focus scale; ``slope_from_disparity`` px per view;
-    ``record`` the tables of ``run.toml``; ``files`` beside the page; ``live`` what a server offers, or ``None``.
+    ``slopes`` in focus of a single light field, px per view; ``geometry`` that turns px into metres; ``axis`` of the
+    focus scale; ``slope_from_disparity`` px per view; ``record`` the tables of ``run.toml``; ``files`` beside the page;
+    ``live`` what a server offers, or ``None``.
 """
 
 from __future__ import annotations
@@ -84,6 +85,7 @@ def encode_result(result: PairResult) -> EncodedResult:
             "px_per_code": 1 / _DOUBT_CODES_PER_PX,
             "label": _DOUBT_LABEL,
         },
+        "slopes": None,
         "geometry": {
             "focal_px": geometry.focal_px,
             "baseline_m": geometry.baseline_m,

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from lfstereo import __version__
 from lfstereo.arrays import Float32
 from lfstereo.errors import ContainerError, LfstereoError
@@ -16,13 +18,14 @@ from lfstereo.lightfield.views import display_gain
 from lfstereo.pipeline import open_light_field
 from lfstereo.progress import Progress, silent
 from lfstereo.viewer.content import PAGE_NAME, encode_views
-from lfstereo.viewer.embedding import colour_table, jpeg_uri, picture_from_uri
+from lfstereo.viewer.embedding import array_text, colour_table, jpeg_uri, picture_from_uri
 from lfstereo.viewer.live import LiveField, live_field, live_field_from_pictures, slope_map
 from lfstereo.viewer.shelf import Item
 from lfstereo.viewer.template import read_content
 
 _LEAST_VIEWS = 4
 """Fewer views make no picture worth refocusing."""
+_SLOPE_PER_CODE = 1 / 4096
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,8 +38,6 @@ class OpenItem:
     """``None`` where there are too few views."""
     slope_from_axis: tuple[float, float]
     """``(a, b)`` of ``slope = a x + b`` for a value x of the focus scale."""
-    slopes: Float32 | None
-    """``(V, U)`` slope in focus at every px, where no disparity tells it."""
     folder: Path | None
     """The result folder, whose files may be asked for."""
 
@@ -78,7 +79,7 @@ def _open_result(item: Item) -> OpenItem:
         if isinstance(error, LfstereoError):
             raise
         raise ContainerError(f"{page}: damaged ({error!r}); run the pair again to get a new page") from error
-    return OpenItem(content, live, (first, second), None, item.path)
+    return OpenItem(content, live, (first, second), item.path)
 
 
 def _open_field(item: Item, light_field: LightField) -> OpenItem:
@@ -106,6 +107,7 @@ def _open_field(item: Item, light_field: LightField) -> OpenItem:
         **encode_views(sample_views(light_field, gain)),
         "disparity": None,
         "doubt": None,
+        "slopes": None if slopes is None else _encoded(slopes),
         "geometry": None,
         "axis": {"near": near, "far": far, "unit": "px per view", "metric": False},
         "slope_from_disparity": None,
@@ -113,4 +115,11 @@ def _open_field(item: Item, light_field: LightField) -> OpenItem:
         "files": [],
         "live": None,
     }
-    return OpenItem(content, live, (1.0, 0.0), slopes, None)
+    return OpenItem(content, live, (1.0, 0.0), None)
+
+
+def _encoded(slopes: Float32) -> dict[str, Any]:
+    """Return slopes as 16-bit codes from the lowest on."""
+    lowest = float(slopes.min())
+    codes = np.rint((slopes - lowest) / _SLOPE_PER_CODE).astype(np.uint16)
+    return {"values": array_text(codes), "lowest": lowest, "slope_per_code": _SLOPE_PER_CODE}

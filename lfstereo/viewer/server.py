@@ -7,7 +7,6 @@ names it knows.
 
 from __future__ import annotations
 
-import json
 import math
 import secrets
 import threading
@@ -93,8 +92,6 @@ class PageServer(ThreadingHTTPServer):
                 return _file(opened, what[1])
             if opened.live is None or len(what) != 1:
                 raise NotHereError
-            if what[0] == "focus":
-                return _slope(opened, query)
             if what[0] in ("refocus", "export"):
                 return _refocused(opened.live, _focus(query), what[0] == "export")
         raise NotHereError
@@ -204,15 +201,6 @@ def _refocused(live: LiveField, focus: LiveFocus, to_keep: bool) -> Answer:
     codes = srgb16(linear * np.float32(live.gain))
     _, coded = cv2.imencode(".png", np.ascontiguousarray(codes[..., ::-1]))
     return Answer(coded.tobytes(), "image/png", f"refocused_slope_{focus.slope:+.4f}.png")
-
-
-def _slope(opened: OpenItem, query: dict[str, str]) -> Answer:
-    if opened.slopes is None:
-        raise NotHereError
-    rows, columns = opened.slopes.shape
-    x, y = (_number(query, name) for name in ("x", "y"))
-    slope = opened.slopes[int(min(max(y, 0), rows - 1)), int(min(max(x, 0), columns - 1))]
-    return Answer(json.dumps({"slope": float(slope)}).encode(), "application/json")
 
 
 def _focus(query: dict[str, str]) -> LiveFocus:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import http.client
-import json
 import threading
 from collections.abc import Iterator
 from pathlib import Path
@@ -19,12 +18,10 @@ from lfstereo.lightfield.views import display_gain
 from lfstereo.viewer.server import PageServer
 from lfstereo.viewer.shelf import find_items
 
-from .conftest import COLUMNS, NEAR_PX, ROWS, SLOPE_FROM_DISPARITY, light_field
+from .conftest import COLUMNS, ROWS, light_field
 
 CODES_16 = 700
 """Largest difference of 16-bit codes from exact refocusing, about 1 % of white."""
-SLOPE_STEP = 0.1
-"""What five views across tell, px per view."""
 
 
 @pytest.fixture(scope="module")
@@ -99,7 +96,7 @@ def test_other_hosts_and_tokens_are_refused(server: PageServer) -> None:
         "item/0/file/focal_stack_left",
         "item/0/file/focal_stack_left/slice_00_d090.00px.png",
         "item/1/file/run.toml",
-        "item/0/focus?x=1&y=1",
+        "item/0/refocus/more?slope=0&radius=2&tilt_x=0&tilt_y=0",
     ],
 )
 def test_nothing_else_is_served(server: PageServer, path: str) -> None:
@@ -142,13 +139,6 @@ def test_exports_what_is_shown(server: PageServer) -> None:
     exact = srgb16(refocus(field, [0.4])[0] * np.float32(display_gain(field))).astype(int)
     assert found.dtype.itemsize and body[24] == 16, "bit depth in the PNG header"
     assert np.abs(found - exact)[8:-8, 8:-8].max() < CODES_16
-
-
-def test_tells_the_slope_at_a_point(server: PageServer) -> None:
-    body = below(server, "item/1/focus?x=30&y=48")[2]
-    expected = SLOPE_FROM_DISPARITY[0] * NEAR_PX + SLOPE_FROM_DISPARITY[1]
-    assert abs(json.loads(body)["slope"] - expected) < SLOPE_STEP
-    assert below(server, "item/1/focus?x=1e9&y=-5")[0] == 200
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import json
 from pathlib import Path
 
@@ -16,7 +17,10 @@ from lfstereo.viewer.opened import open_item
 from lfstereo.viewer.shelf import Item, find_items
 from lfstereo.viewer.template import read_content
 
-from .conftest import COLUMNS, ROWS, SLOPE_FROM_DISPARITY, light_field
+from .conftest import COLUMNS, NEAR_PX, ROWS, SLOPE_FROM_DISPARITY, light_field
+
+SLOPE_STEP = 0.1
+"""What five views across tell, px per view."""
 
 
 def test_lists_results_fields_and_captures(tmp_path: Path, result_folder: Path) -> None:
@@ -62,7 +66,10 @@ def test_opens_a_light_field_and_a_folder_of_views(field_file: Path, tmp_path: P
     assert opened.content["size"] == [ROWS, COLUMNS]
     assert opened.content["disparity"] is None
     assert opened.live is not None
-    assert opened.slopes is not None
+    slopes = opened.content["slopes"]
+    codes = np.frombuffer(base64.b64decode(slopes["values"]), "<u2").reshape(ROWS, COLUMNS)
+    near = slopes["lowest"] + slopes["slope_per_code"] * codes[48, 30]
+    assert near == pytest.approx(SLOPE_FROM_DISPARITY[0] * NEAR_PX + SLOPE_FROM_DISPARITY[1], abs=SLOPE_STEP)
     assert opened.content["axis"]["near"] > 0.4 > -0.44 > opened.content["axis"]["far"]
     json.dumps(opened.content, allow_nan=False)
     write_views_folder(tmp_path / "views", light_field(3))

@@ -19,6 +19,13 @@ function disparityAt(x, y) {
   return DISPARITY ? DISPARITY[y * WIDTH + x] * CONTENT.disparity.px_per_code : null;
 }
 
+// Slope in focus at a pixel of a single light field, px per view.
+const SLOPES = CONTENT.slopes && new Uint16Array(bytesOf(CONTENT.slopes.values).buffer);
+
+function slopeAt(x, y) {
+  return SLOPES ? CONTENT.slopes.lowest + SLOPES[y * WIDTH + x] * CONTENT.slopes.slope_per_code : null;
+}
+
 const isValid = (x, y) => Boolean(VALID && VALID[y * WIDTH + x]);
 
 function metresOf(disparity) {

@@ -11,7 +11,6 @@ function startLive(served) {
     radius: look.radius.toFixed(2), tilt_x: look.tilt_x.toFixed(4), tilt_y: look.tilt_y.toFixed(4),
   }).toString();
   const slopeOf = (value) => served.slope_from_axis[0] * value + served.slope_from_axis[1];
-  const valueOf = (slope) => (slope - served.slope_from_axis[1]) / served.slope_from_axis[0];
 
   // One request at a time; the newest wish follows when it is answered.
   async function pump() {
@@ -36,10 +35,6 @@ function startLive(served) {
     draw(context) {
       if (shown) context.drawImage(shown, 0, 0, WIDTH, HEIGHT);
       return Boolean(shown);
-    },
-    async valueAt(x, y) {
-      const answer = await fetch(`${served.base}focus?x=${x}&y=${y}`).catch(() => null);
-      return answer && answer.ok ? valueOf((await answer.json()).slope) : null;
     },
     controls() {
       const degrees = (value) => (value === 0 ? "none" : `${value > 0 ? "+" : "−"}${Math.abs(value).toFixed(2)}`);

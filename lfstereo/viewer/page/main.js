@@ -74,7 +74,7 @@ function nearer(factor) {
 
 // What is shown, at the pixels of the result rather than those of the screen.
 function savePicture() {
-  let canvas = byId("space");
+  let canvas = byId("space-canvas");
   if (mode !== spaceMode) {
     canvas = offscreen(WIDTH, HEIGHT);
     mode.draw(canvas.getContext("2d"));

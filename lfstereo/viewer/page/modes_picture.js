@@ -130,9 +130,9 @@ const focusMode = {
     };
     requestAnimationFrame(step);
   },
-  async tap(x, y) {
+  tap(x, y) {
     showRing(x + 0.5, y + 0.5);
-    const value = DISPARITY ? disparityAt(x, y) : this.live ? await this.live.valueAt(x, y) : null;
+    const value = DISPARITY ? disparityAt(x, y) : slopeAt(x, y);
     if (value !== null) this.pull(clamp(axisShare(value), 0, 1));
   },
   arrow(dx, dy) {

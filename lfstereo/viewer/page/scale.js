@@ -1,6 +1,6 @@
 // The distance scale under the stage, like the one on a lens barrel, and the readings below it.
 
-const focusInput = byId("focus");
+const focusInput = byId("focus-scale");
 const needle = byId("needle");
 
 function buildScale() {
@@ -67,6 +67,7 @@ const READINGS = [
   { name: "Column, row", of: (at) => `${at.x},\u2002${at.y}`, unit: "px" },
   { name: "Disparity", of: (at) => disparityAt(at.x, at.y).toFixed(2), unit: "px", shown: Boolean(DISPARITY), id: "disparity" },
   { name: "Depth", of: (at) => metresText(metresOf(disparityAt(at.x, at.y))), unit: "m", shown: Boolean(DISPARITY), id: "depth" },
+  { name: "Slope", of: (at) => slopeAt(at.x, at.y).toFixed(3).replace("-", "−"), unit: "px per view", shown: Boolean(SLOPES), id: "slope" },
   { name: "Doubt", of: (at) => { const d = doubtAt(at.x, at.y); return d === null ? "—" : d.toFixed(2); }, unit: "px", shown: Boolean(DOUBT), id: "doubt", optional: true },
   { name: "Seen by", of: (at) => (isValid(at.x, at.y) ? "both" : "one"), unit: "", shown: Boolean(DISPARITY), id: "seen", optional: true },
 ].filter((reading) => reading.shown !== false);
@@ -86,5 +87,5 @@ function showReadout() {
     reading.target.className = text === "—" ? "none" : "";
     reading.target.replaceChildren(text, ...(text === "—" || !reading.unit ? [] : [" ", element("small", { textContent: reading.unit })]));
   }
-  placeNeedle(cursor && DISPARITY ? disparityAt(cursor.x, cursor.y) : null);
+  placeNeedle(cursor ? disparityAt(cursor.x, cursor.y) ?? slopeAt(cursor.x, cursor.y) : null);
 }

@@ -13,20 +13,20 @@ const spaceMode = {
   scene: null,
   renderer: null,
   async enter() {
-    byId("space").hidden = false;
+    byId("space-canvas").hidden = false;
     pictureCanvas.hidden = true;
     setCursor(null);
     if (!this.scene) {
       this.scene = await buildScene();
       const wanted = new URLSearchParams(location.search).get("draw");
-      const canvas = byId("space");
+      const canvas = byId("space-canvas");
       this.renderer = (wanted !== "canvas" && webglRenderer(canvas, this.scene, wanted === "webgl")) || canvasRenderer(canvas, this.scene);
       if (mode === this) showPanel();
     }
     this.paint();
   },
   leave() {
-    byId("space").hidden = true;
+    byId("space-canvas").hidden = true;
     pictureCanvas.hidden = false;
   },
   paint: oncePerFrame(() => { if (spaceMode.renderer && mode === spaceMode) spaceMode.renderer.draw(spaceMode.orbit, spaceMode.look); }),
