@@ -19,6 +19,10 @@ _COARSE_STEP = 0.5
 _ROUNDS = ((1, 3), (3, 2), (None, 2))
 """How far views are from the centre view, and how often the slope is improved with them."""
 _LEAST_PIXELS = 50
+_NEIGHBOURS_AGREE_PX = 0.5
+"""Largest difference, at the outermost view, of a slope from the median of the 5 x 5 px around it."""
+_LEAST_NOISE = 1e-3
+"""Mismatch of views, in square roots of luminance, that rounding alone brings about."""
 _TINY = 1e-9
 
 
@@ -123,10 +127,10 @@ def estimate_slopes(
             progress(done, steps)
     outermost = max(max(map(abs, away)) for away in views)
     smooth = cv2.medianBlur(slope, 5)
-    agrees = np.abs(slope - smooth) * outermost < 1.0
+    agrees = np.abs(slope - smooth) * outermost < _NEIGHBOURS_AGREE_PX
     inside = np.abs(slope) <= options.search
     certain = (uncertainty * outermost < options.uncertainty) & agrees & inside & _within(slope, outermost)
-    return SlopeMap(slope, uncertainty, certain)
+    return SlopeMap(smooth, uncertainty, certain)
 
 
 def _cross(light_field: LightField) -> dict[tuple[int, int], tuple[int, int]]:
@@ -186,8 +190,10 @@ def _improved(
     towards, texture, misfit = (cv2.GaussianBlur(part, (0, 0), sigma) for part in (towards, texture, misfit))
     step = towards / (texture + _TINY)
     limit = 1.0 / max(max(map(abs, away)) for away in views)
-    left = np.maximum(misfit - step * towards, 0) / len(views)
-    return slope + np.clip(step, -limit, limit), np.sqrt(left / (texture + _TINY)).astype(np.float32)
+    left = np.maximum(misfit - step * towards, 0) / len(views) + np.float32(_LEAST_NOISE**2)
+    # A Gaussian window is 4 pi sigma^2 px large; a quarter of them are taken for independent, smoothed as views are.
+    deviation = np.sqrt(left / (np.pi * sigma**2 * (texture + _TINY)))
+    return slope + np.clip(step, -limit, limit), deviation.astype(np.float32)
 
 
 def _within(slope: Float32, outermost: int) -> Bool:
