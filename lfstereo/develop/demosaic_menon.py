@@ -63,8 +63,8 @@ def _roughness(chroma: Float32, down: bool) -> Float32:
     """
     kernel = np.array([0, 0, -1, 0, 1], np.float32)
     one = np.ones(1, np.float32)
-    pair = (one, kernel) if down else (kernel, one)
-    changes = np.abs(cv2.sepFilter2D(chroma, cv2.CV_32F, *pair, borderType=cv2.BORDER_REFLECT_101))
+    along_x, along_y = (one, kernel) if down else (kernel, one)
+    changes = np.abs(cv2.sepFilter2D(chroma, cv2.CV_32F, along_x, along_y, borderType=cv2.BORDER_REFLECT_101))
     window = np.zeros((5, 5), np.float32)
     window[::2, :3:2], window[1::2, 1] = (1, 1), 1
     window[2, :3:2] = 3
