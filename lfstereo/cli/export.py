@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from lfstereo.lightfield.interchange.picture_folders import HciLengths
 
 _FORMATS = ("h5", "mat", "eslf", "hci", "png", "tiff", "dng")
-_CAPTURE_SUFFIXES = (".lfr", ".lfp", ".raw")
+_CAPTURE_SUFFIXES = (".lfr", ".lfp", ".raw", ".dng")
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
