@@ -94,7 +94,15 @@ class ClusterCrew:
         return executor
 
     def _capacity(self, resource: str | None) -> Callable[[], int]:
-        return lambda: max(1, self._count(resource) * (1 + _WAITING_PER_WORKER))
+        workers = self._count(resource)
+
+        def now() -> int:
+            nonlocal workers
+            with suppress(OSError, RuntimeError):  # a lost scheduler shows in the futures
+                workers = self._count(resource)
+            return max(1, workers * (1 + _WAITING_PER_WORKER))
+
+        return now
 
     def _check(self, address: str, output: Path) -> None:
         with suppress(TimeoutError):

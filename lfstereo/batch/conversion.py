@@ -83,12 +83,15 @@ def run_batch(
             announce(plan)
         jobs = [_job(pair, request, secrets.token_hex(8)) for pair in plan.to_do]
         outcomes: dict[str, Outcome] = {}
-        stopped = _convert(request, plan, jobs, work, outcomes, announce is None) if jobs else ""
+        try:
+            stopped = _convert(request, plan, jobs, work, outcomes, announce is None) if jobs else ""
+        finally:
+            _clean(request, plan)
         return _finish(request, plan, outcomes, stopped)
 
 
 def _clean(request: BatchRequest, plan: Plan) -> None:
-    """Remove what an interrupted batch left of these pairs."""
+    """Remove what lost workers left of these pairs, in this batch or in one before."""
     output, whole = request.output, request.batch.shard_of()[1] == 1
     names = ["*"] if whole else [glob.escape(pair.files.name) for pair in plan.pairs]
     for name in names:

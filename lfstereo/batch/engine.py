@@ -88,7 +88,12 @@ class Engine:
                 room = min(room, 2 * self._steps[at + 1].capacity() - len(self._waiting[at + 1]))
             for _ in range(min(room, len(queue))):
                 flight = queue.popleft()
-                self._flying[step.executor.submit(step.work, flight.job)] = flight
+                try:
+                    self._flying[step.executor.submit(step.work, flight.job)] = flight
+                except RuntimeError as error:
+                    queue.appendleft(flight)
+                    self._stopped = f"no work can be handed out ({error})"
+                    return
 
     def _take_in(self, flight: Flight, future: Future[Outcome]) -> None:
         job = flight.job

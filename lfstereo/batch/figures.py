@@ -20,8 +20,7 @@ _JPEG_QUALITY = 85
 def quality_figures(report: Report, result: PairResult) -> dict[str, float]:
     """Return the figures of a finished pair: coverage, ranges, agreement of the two views, errors where truth is known.
 
-    ``view_difference`` is the mean difference, in 8-bit sRGB levels, between the left centre view and the right one
-    moved by the disparity, over the valid pixels: small where the map fits the pictures, 20 and more where it does not.
+    ``view_difference`` is that of :func:`view_difference`: to compare the pairs of a session with each other.
     """
     figures = {
         "valid_share": report.valid_share,
@@ -37,7 +36,10 @@ def quality_figures(report: Report, result: PairResult) -> dict[str, float]:
 
 
 def view_difference(result: PairResult) -> float:
-    """Return the mean absolute difference of the left view and the right one moved onto it, sRGB levels 0..255."""
+    """Return the mean absolute difference of the left view and the right one moved onto it, sRGB levels 0..255.
+
+    Over the valid pixels, hidden ones too; the right view's colours are brought to the left one's means before.
+    """
     left = srgb8(result.left.centre_view).astype(np.float32)
     right = srgb8(result.right.centre_view).astype(np.float32)
     disparity = np.asarray(result.map.disparity, np.float32)
@@ -46,7 +48,11 @@ def view_difference(result: PairResult) -> float:
     y = np.repeat(np.arange(rows, dtype=np.float32)[:, None], columns, axis=1)
     moved: Float32 = np.asarray(cv2.remap(right, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE), np.float32)
     valid = result.map.valid
-    return float(np.abs(left - moved)[valid].mean()) if valid.any() else 0.0
+    if not valid.any():
+        return 0.0
+    left, moved = left[valid], moved[valid]
+    gain = left.mean(axis=0) / np.maximum(moved.mean(axis=0), 1.0)
+    return float(np.abs(left - moved * gain).mean())
 
 
 def write_thumbnail(folder: Path) -> None:

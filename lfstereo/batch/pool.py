@@ -54,7 +54,7 @@ class WorkerPool(Executor):
             if not wait:
                 for pid in _processes(pool):
                     self.kill(pid)
-            pool.shutdown(wait, cancel_futures=cancel_futures or not wait)
+            pool.shutdown(cancel_futures=cancel_futures or not wait)
 
     def kill(self, pid: int) -> None:
         """Kill a worker by its process number, if it is one of these; its call ends with a broken pool."""

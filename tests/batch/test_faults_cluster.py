@@ -150,19 +150,19 @@ def test_client_killed_in_mid_run(site: Any, cluster: Cluster) -> None:
 def test_scheduler_killed_in_mid_run(site: Any, cluster: Cluster) -> None:
     """Survived: the finished pair; the batch ends and says so, and goes on with a new scheduler."""
     site.wait_until(cluster.is_complete, "both workers")
-    site.pairs("ok", "wait")
+    site.pairs("ok", *(f"wait{n}" for n in range(5)))
     batch = start(site, cluster)
-    site.worker_at("wait", "write results")
+    site.worker_at("wait0", "write results")
     site.wait_until(lambda: site.states().get("ok") == "done", "the first pair")
     os.kill(cluster.processes[0].pid, signal.SIGKILL)
     code, printed = site.end_of(batch)
     assert code == FAILED_PART
     assert "the scheduler was lost" in printed
-    assert "1 converted, 0 kept, 0 failed, 1 not done" in printed
+    assert "1 converted, 0 kept, 0 failed, 5 not done" in printed
     assert site.visible() == {"ok"}
     (site.folder / "go").touch()
     code, printed = site.run()
-    assert (code, "1 converted, 1 kept" in printed) == (0, True)
+    assert (code, "5 converted, 1 kept" in printed) == (0, True)
 
 
 def test_no_scheduler(site: Any, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -57,6 +57,7 @@ def test_worker_killed_from_outside_in_mid_write(site: Any) -> None:
     assert code == 0
     assert site.visible() == {"wait", "ok"}
     assert not site.is_running(second["process"])
+    assert not list(site.out.glob(".*.partial"))
 
 
 def test_pair_that_kills_its_worker(site: Any) -> None:
@@ -109,6 +110,7 @@ def test_interrupt_from_the_keyboard(site: Any) -> None:
     assert "interrupted" in printed
     assert not site.is_running(worker)
     assert site.visible() == {"ok"}
+    assert not list(site.out.glob(".*.partial"))
 
 
 def test_two_batches_on_one_folder(site: Any) -> None:
