@@ -101,6 +101,26 @@ def main() -> None:
     print(f"{MORE_SLICES} slices            lfstereo {many:6.2f} s   {many / ours:.2f} times {SLICES} slices")
     cubic = best_seconds(lambda: refocus(plain, at, CUBIC), 2)
     print(f"cubic shifts         lfstereo {cubic:6.2f} s   {cubic / ours:.2f} times linear shifts")
+    on_graphics_card(plain, at)
+
+
+def on_graphics_card(field: LightField, at: np.ndarray) -> None:
+    """Print the time of a stack from a light field that lies in the memory of a graphics card, where there is one."""
+    import torch
+
+    from lfstereo.network.refocus_device import refocus_resident, to_device
+
+    if not torch.cuda.is_available():
+        print("graphics card        none here, not measured")
+        return
+    views, aperture = to_device(field, "cuda"), aperture_weights(field, EVERY_VIEW)
+
+    def stack() -> None:
+        refocus_resident(views, at, aperture)
+        torch.cuda.synchronize()
+
+    stack()
+    print(f"graphics card        lfstereo {1000 * best_seconds(stack):6.1f} ms   {torch.cuda.get_device_name()}")
 
 
 if __name__ == "__main__":

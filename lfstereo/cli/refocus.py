@@ -36,6 +36,7 @@ class PictureOptions:
     )
     upsample: int = option(1, "px of the pictures per px of a view: detail from views that differ by parts of a px")
     all_in_focus: bool = option(False, "also fuse the slices into one picture that is sharp everywhere")
+    device: Literal["cpu", "cuda"] = option("cpu", "where the views are summed; cuda: on a graphics card")
     any_zoom: bool = option(False, "accept light fields at another zoom or focus than the rig was calibrated at")
 
 
@@ -161,6 +162,10 @@ def _render(
                 stacks.append(np.stack(shown))
             elif pictures.upsample != 1:
                 stacks.append(np.stack([superresolve(field, float(s), pictures.upsample, views) for s in slopes]))
+            elif pictures.device != "cpu":
+                from lfstereo.network.refocus_device import refocus_on_device
+
+                stacks.append(refocus_on_device(field, slopes, views, pictures.device))
             else:
                 stacks.append(refocus(field, slopes, views, progress))
     return stacks
