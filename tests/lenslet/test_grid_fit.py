@@ -192,3 +192,26 @@ def test_grid_that_is_not_known_well_is_refused(draw_frame: Callable[..., Any]) 
     assert 0 < (fit_grid(frame.capture).uncertainty_px or 0) < WHITE_RMS_PX
     with pytest.raises(GridFitError, match=r"known to 0\.00 px only, expected 1e-05 px or better"):
         fit_grid(frame.capture, GridOptions(largest_uncertainty_px=1e-5))
+
+
+def test_micro_images_cut_off_centre_towards_the_corners_do_not_move_the_grid(draw_frame: Callable[..., Any]) -> None:
+    frame = draw_frame(shape=(700, 760))
+    y, x = np.mgrid[:700, :760].astype(np.float64)
+    from_lenslet = frame.lattice_error(np.stack([x, y], axis=-1)).reshape(700, 760, 2)
+    from_middle = np.stack([x - 379.5, y - 349.5], axis=-1) - from_lenslet
+    # A second disc of the same size that slides inwards by up to 3 px cuts the outer side of each micro-image.
+    slide = 3.0 * (np.hypot(*np.moveaxis(from_middle, -1, 0)) / 516 - 0.45).clip(0) / 0.55
+    inwards = -from_middle / np.maximum(np.hypot(*np.moveaxis(from_middle, -1, 0)), 1)[..., None]
+    cut = 1 / (1 + np.exp((np.hypot(*np.moveaxis(from_lenslet - slide[..., None] * inwards, -1, 0)) - 6.6) / 0.3))
+    light = np.where(np.hypot(*np.moveaxis(from_lenslet, -1, 0)) < 6.6, cut, 1.0)
+    mosaic = np.round(64 + (frame.capture.mosaic - 64.0) * light).astype(np.uint16)
+    capture = replace(frame.capture, mosaic=mosaic)
+
+    def centre_of_light() -> float:
+        near = np.hypot(*np.moveaxis(from_lenslet, -1, 0)) < 7
+        outer = near & (slide > 2)
+        weight = (mosaic - 64.0)[outer]
+        return float((weight * (from_lenslet * inwards).sum(-1)[outer]).sum() / weight.sum())
+
+    assert centre_of_light() > 0.5
+    assert rms(frame.lattice_error(fit_grid(capture).centres())) < SHADED_RMS_PX
