@@ -1,8 +1,8 @@
 """Stacks of planes facing the camera: where a network that gets its slices as channels learns what focus is.
 
 A crop of a sharp picture is set at one disparity and blurred for each slice, so that the whole crop says one thing.
-Concatenated slices hold no hint that sharpness matters; on full scenes Focus-Net's four branches do not find it within
-an hour of a processor, on these planes within minutes.
+Concatenated slices hold no hint that sharpness matters: on full scenes Focus-Net's four branches are no better than a
+constant after minutes of a processor, on these planes they halve its error in the same time.
 """
 
 from __future__ import annotations
