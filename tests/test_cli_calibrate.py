@@ -151,6 +151,7 @@ def test_raw_captures_need_white_images_and_one_zoom(monkeypatch: pytest.MonkeyP
     monkeypatch.setattr(session, "find_corners", lambda *_: (_ for _ in ()).throw(TargetNotFoundError("none")))
     with pytest.raises(AssetError, match=r"1\.LFR: a raw capture needs the camera's white images"):
         see_targets([("1", tmp_path / "1.LFR", tmp_path / "1.LFR")], TARGET, None)
+    monkeypatch.setattr(session, "thin_lens_of_metadata", lambda metadata: None)
     blank = types.SimpleNamespace(sampling=None)
     monkeypatch.setattr(session.ShotSide, "_decoded", lambda *_: blank)
     shots = [(n, tmp_path / f"{n}.LFR", tmp_path / f"{n}.LFR") for n in ("1", "2")]

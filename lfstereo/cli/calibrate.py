@@ -90,7 +90,8 @@ def _calibrate(arguments: argparse.Namespace) -> int:
     for name, reason in session.unusable:
         print(f"shot {name} left out: {reason}", file=sys.stderr)
     with clock.stage("solve") as progress:
-        solution = solve_rig(session.pairs, target.points, session.sizes_px, session.pixel_px, options, progress)
+        shown = (session.pairs, target.points, session.sizes_px, session.pixel_px)
+        solution = solve_rig(*shown, options, progress, session.lenses)
     write_rig(arguments.output, session.labelled(solution.rig), arguments.force)
     write_report(report, solution, target.points, arguments.force)
     summary = _summary(solution, session, clock)
@@ -189,11 +190,31 @@ def _summary(solution: RigSolution, session: Session, clock: StageClock) -> dict
         "focal_px": [rig.left.focal_px, rig.right.focal_px],
         "range_m": [rig.near_m, rig.far_m],
         "residual_px": solution.sigma_px,
+        "lenses": _lenses(solution, session),
         "shots": [{"name": e.name, "side": e.side, "rms_px": e.rms_px, "corners": e.corners} for e in solution.errors],
         "rejected": list(solution.rejected),
         "without_target": [name for name, _ in session.unusable],
         "seconds": clock.seconds,
     }
+
+
+def _lenses(solution: RigSolution, session: Session) -> list[dict[str, float]]:
+    """Return both lenses as found and as the metadata tell, where raw captures did."""
+    from lfstereo.rig.thin_lens import thin_lens_of_camera
+
+    told = []
+    for camera, start in zip((solution.rig.left, solution.rig.right), session.lenses, strict=True):
+        if start is not None:
+            found = thin_lens_of_camera(camera, start)
+            told.append(
+                {
+                    "focal_length_m": found.focal_length_m,
+                    "focal_length_m_metadata": start.focal_length_m,
+                    "lenslet_gap_m": found.lenslet_gap_m,
+                    "lenslet_gap_m_metadata": start.lenslet_gap_m,
+                }
+            )
+    return told
 
 
 def _text(summary: dict[str, Any], output: Path, report: Path) -> str:
@@ -206,6 +227,12 @@ def _text(summary: dict[str, Any], output: Path, report: Path) -> str:
         f"{len(summary['shots']) // 2} shots used, residual {summary['residual_px']:.2f} sensor px, worst shot "
         f"{worst['name']} {worst['side']} ({worst['rms_px']:.2f} px)",
     ]
+    for side, lens in zip(("left", "right"), summary["lenses"], strict=False):
+        lines.append(
+            f"{side} lens {lens['focal_length_m'] * 1e3:.2f} mm, its lenslets {lens['lenslet_gap_m'] * 1e6:.2f} um "
+            f"before the sensor; metadata {lens['focal_length_m_metadata'] * 1e3:.2f} mm, "
+            f"{lens['lenslet_gap_m_metadata'] * 1e6:.2f} um"
+        )
     if summary["rejected"]:
         lines.append(f"rejected, as they contradict the others: {', '.join(summary['rejected'])}")
     lines.append(", ".join(f"{name} {seconds:.1f} s" for name, seconds in summary["seconds"].items()))

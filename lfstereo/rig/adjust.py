@@ -18,6 +18,9 @@ _CLIP_SIGMAS = 3.0
 _MEDIAN_OF_NORM = 1.1774
 """Median length of a 2-D Gaussian residual in standard deviations, sqrt(2 ln 2)."""
 _MAX_STEPS = 60
+_BLOCKS = 4
+"""What is wrong with a corner is partly wrong with its neighbours too: residuals count as independent between this many
+parts of the board along both directions, not within."""
 _SMALL_GAIN = 1e-3
 """Of the cost in variances: a step that gains less moves no unknown by a twentieth of its standard deviation."""
 
@@ -33,6 +36,10 @@ class LensModel:
     """``(n,)`` what the parameters are without any measurement."""
     expected_sd: Float64
     """``(n,)`` standard deviation of that; ``inf`` = anything."""
+    low: Float64
+    """``(n,)`` least value of each parameter; ``-inf`` = any."""
+    high: Float64
+    """``(n,)`` largest value; ``inf`` = any."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +73,7 @@ class Adjustment:
     state: BundleState
     covariance: Float64
     """Of the free parameters: cameras in turn, rig (rotation about its own axes in rad, translation in m), then six
-    numbers per pose. Robust against residuals of one corner that are alike in all views."""
+    numbers per pose. Robust against residuals that are alike in all views and in one part of the board."""
     sigma_px: float
     """Robust standard deviation of a residual coordinate."""
     residuals: tuple[Float64, ...]
@@ -122,8 +129,8 @@ def adjust(
 ) -> Adjustment:
     """Move cameras, rig and poses until the corners are seen where they were seen.
 
-    Minimises the confidence-weighted Huber loss of the residuals in px; its bend lies at three robust standard
-    deviations of the residuals and is set anew until it stays.
+    Parameters stay within the bounds of their lens model. Minimises the confidence-weighted Huber loss of the
+    residuals in px; its bend lies at three robust standard deviations of the residuals and is set anew until it stays.
 
     Parameters
     ----------
@@ -220,7 +227,7 @@ def _descend(
 def _normal_equations(
     problem: _Problem, state: BundleState, clip: float, meat: Float64 | None = None
 ) -> tuple[Float64, Float64, int]:
-    """Return ``J'WJ`` and ``J'Wr``, with what was expected; add the squares of each corner's scores to ``meat``."""
+    """Return ``J'WJ`` and ``J'Wr``, with what was expected; add the squares of each part's scores to ``meat``."""
     size = problem.shared + 6 * problem.poses
     normal, gradient, clusters = np.zeros((size, size)), np.zeros(size), 0
     away, weight = problem.surprise(state)
@@ -240,11 +247,20 @@ def _normal_equations(
         normal[np.ix_(columns, columns)] += np.einsum("mac,mad->cd", weighted, jacobian)
         gradient[columns] += np.einsum("mac,ma->c", weighted, residual)
         if meat is not None:
-            scores = np.zeros((len(problem.points), len(columns)))
-            np.add.at(scores, shot.corner, np.einsum("mac,ma->mc", weighted, residual))
+            scores = np.zeros((_BLOCKS**2, len(columns)))
+            block = _blocks(problem.points)[shot.corner]
+            np.add.at(scores, block, np.einsum("mac,ma->mc", weighted, residual))
             meat[np.ix_(columns, columns)] += scores.T @ scores
-            clusters += len(np.unique(shot.corner[shot.weight > 0]))
+            clusters += len(np.unique(block[shot.weight > 0]))
     return normal, gradient, clusters
+
+
+def _blocks(points: Float64) -> np.ndarray[tuple[int], np.dtype[np.intp]]:
+    """Return which part of the board each corner belongs to, ``(N,)``."""
+    low, high = points[:, :2].min(axis=0), points[:, :2].max(axis=0)
+    column, row = np.minimum((points[:, :2] - low) / (high - low) * _BLOCKS, _BLOCKS - 1).astype(np.intp).T
+    block: np.ndarray[tuple[int], np.dtype[np.intp]] = row * _BLOCKS + column
+    return block
 
 
 def _derivatives(problem: _Problem, state: BundleState, seen: Seen) -> tuple[Float64, Float64]:
@@ -279,7 +295,7 @@ def _moved(problem: _Problem, state: BundleState, delta: Float64) -> BundleState
         count = int(model.free.sum())
         moved = values.copy()
         moved[model.free] += delta[first : first + count]
-        cameras.append(moved)
+        cameras.append(np.clip(moved, model.low, model.high))
         first += count
     if len(problem.models) > 1:
         rotation = Rotation.from_rotvec(delta[first : first + 3]).as_matrix() @ state.rig_rotation

@@ -17,10 +17,12 @@ from lfstereo.rig.intrinsics import plenoptic_rays
 from lfstereo.rig.rig import PlenopticCamera, StereoRig
 from lfstereo.rig.sightings import Sightings, usable
 from lfstereo.rig.start import start_focal_px, start_poses, start_pupil, start_rig
-from lfstereo.rig.trust import check_baseline, check_count, check_coverage, check_poses
+from lfstereo.rig.thin_lens import LensBounds, ThinLens, lens_bounds
+from lfstereo.rig.trust import check_baseline, check_count, check_coverage, check_lens_range, check_poses
 
 SizePair = tuple[tuple[int, int], tuple[int, int]]
 """(width, height) of the left and the right sensor, px."""
+LensPair = tuple[ThinLens | None, ThinLens | None]
 _CENTRE_SD = 0.015
 """How far principal point and centre of distortion are expected from the middle, in widths of the frame."""
 _BEND_SD = (0.03, 0.01, 0.01)
@@ -39,6 +41,7 @@ class RigOptions:
     far_m: float = option(0.0, "far end of the working range; 0 = the farthest corner", "m")
     pixel_px: float = option(0.0, "size of a rectified px; 0 = as decoded", "sensor px")
     any_set: bool = option(False, "accept sets of photographs that do not determine the rig well")
+    any_lens: bool = option(False, "accept lenses that contradict the captures' metadata")
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,6 +92,7 @@ def solve_rig(
     pixel_px: float,
     options: RigOptions = RigOptions(),
     progress: Progress = silent,
+    lenses: LensPair = (None, None),
 ) -> RigSolution:
     """Calibrate a rig from the corners of a target in all views of both cameras.
 
@@ -104,18 +108,22 @@ def solve_rig(
         Sensor px per px of a rectified view, unless the options say otherwise.
     options
         What to estimate and what to reject.
+    lenses
+        The left and the right camera's lens as their metadata tell; the search starts within what that allows and
+        stays there. ``None``: not known.
 
     Raises
     ------
     RigError
-        If the shots are too few, too much alike, cover too little or leave the baseline open; the message says
-        what to photograph next.
+        If the shots are too few, too much alike, cover too little or leave the baseline open, or the lenses are not
+        those of the metadata; the message says what to photograph or measure next.
     """
     used = [pair for pair in pairs if usable(pair.left) and usable(pair.right)]
     check_count(len(used), len(pairs))
     used.sort(key=lambda pair: pair.name)
-    start = _start(used, points, sizes_px)
-    models = _models(used, sizes_px, [float(camera[0]) for camera in start.cameras], options)
+    bounds = tuple(None if lens is None or options.any_lens else lens_bounds(lens) for lens in lenses)
+    start = _start(used, points, sizes_px, bounds)
+    models = _models(used, sizes_px, [float(camera[0]) for camera in start.cameras], options, bounds)
     result = _adjust(used, points, models, start, progress)
     rejected: list[str] = []
     for _ in range(3):
@@ -139,10 +147,14 @@ def is_pinhole(shots: Sequence[Sightings]) -> bool:
 
 
 def _models(
-    pairs: Sequence[ShotPair], sizes_px: SizePair, focals_px: Sequence[float], options: RigOptions
+    pairs: Sequence[ShotPair],
+    sizes_px: SizePair,
+    focals_px: Sequence[float],
+    options: RigOptions,
+    bounds: Sequence[LensBounds | None],
 ) -> tuple[LensModel, LensModel]:
     models = []
-    for shots, (width, height), focal in zip(_sides(pairs), sizes_px, focals_px, strict=True):
+    for shots, (width, height), focal, bound in zip(_sides(pairs), sizes_px, focals_px, bounds, strict=True):
         free = np.ones(11, np.bool_)
         free[4:6] = not is_pinhole(shots)
         free[6:9] = np.arange(3) < options.radial_terms
@@ -152,7 +164,12 @@ def _models(
         sd[2:4] = _CENTRE_SD * width
         sd[6:9] = np.array(_BEND_SD) / (0.5 * width / focal) ** np.array([2, 4, 6])
         sd[9:] = _CENTRE_SD * width / focal
-        models.append(LensModel(plenoptic_rays, free, expected, sd))
+        low, high = np.full(11, -np.inf), np.full(11, np.inf)
+        if bound is not None:
+            for side, values in enumerate((low, high)):
+                values[:2], values[5] = bound.focal_px[side], bound.pupil_m_per_px[side]
+                values[4] = bound.vergence_per_m[side]
+        models.append(LensModel(plenoptic_rays, free, expected, sd, low, high))
     return models[0], models[1]
 
 
@@ -160,11 +177,13 @@ def _sides(pairs: Sequence[ShotPair]) -> tuple[list[Sightings], list[Sightings]]
     return [pair.left for pair in pairs], [pair.right for pair in pairs]
 
 
-def _start(pairs: Sequence[ShotPair], points: Float64, sizes_px: SizePair) -> BundleState:
+def _start(
+    pairs: Sequence[ShotPair], points: Float64, sizes_px: SizePair, bounds: Sequence[LensBounds | None]
+) -> BundleState:
     cameras, poses = [], []
-    for shots, size in zip(_sides(pairs), sizes_px, strict=True):
+    for shots, size, bound in zip(_sides(pairs), sizes_px, bounds, strict=True):
         centre = (np.asarray(size, np.float64) - 1) / 2
-        focal = start_focal_px(shots, points, centre, float(max(size)))
+        focal = start_focal_px(shots, points, centre, float(max(size)), bound.focal_px if bound else None)
         poses.append([start_poses(shot, points, focal, centre) for shot in shots])
         cameras.append(np.array([focal, focal, *centre, 1.0, 1e-3, 0, 0, 0, 0, 0]))
     rotation, translation, turns, moves = start_rig(*poses)
@@ -175,10 +194,13 @@ def _start(pairs: Sequence[ShotPair], points: Float64, sizes_px: SizePair) -> Bu
         rotations=np.stack(turns),
         translations=np.stack(moves),
     )
-    for side, (camera, shots) in enumerate(zip(cameras, _sides(pairs), strict=True)):
+    for side, (camera, shots, bound) in enumerate(zip(cameras, _sides(pairs), bounds, strict=True)):
         if not is_pinhole(shots):
             depths = [points_in_camera(state, points, side, n)[:, 2] for n in range(len(pairs))]
             camera[4:6] = start_pupil(shots, depths, camera[0])
+            if bound is not None:
+                camera[4] = np.clip(camera[4], *bound.vergence_per_m)
+                camera[5] = np.clip(camera[5], *bound.pupil_m_per_px)
     return state
 
 
@@ -223,6 +245,9 @@ def _checked(
     options: RigOptions,
 ) -> RigSolution:
     state = result.state
+    for side, shots, values, model in zip(("left", "right"), _sides(pairs), state.cameras, models, strict=True):
+        if not is_pinhole(shots):
+            check_lens_range(side, values, model.low, model.high)
     if not options.any_set:
         check_poses(state.rotations, state.translations, points)
         for side, shots, size in zip(("left", "right"), _sides(pairs), sizes_px, strict=True):

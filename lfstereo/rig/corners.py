@@ -13,6 +13,7 @@ from lfstereo.errors import TargetNotFoundError
 from lfstereo.lightfield.field import LightField, ViewSampling
 from lfstereo.options import option
 from lfstereo.progress import Progress, silent
+from lfstereo.rig.saddle import saddle_points
 from lfstereo.rig.sightings import Sightings
 from lfstereo.rig.target import Target
 
@@ -62,8 +63,7 @@ def find_corners(
     References
     ----------
     Duda and Frese, "Accurate detection and localization of checkerboard corners for calibration" (BMVC 2018), the
-    search; Foerstner and Guelch, "A fast operator for detection and precise location of distinct points" (1987),
-    the refinement.
+    search.
     """
     t0, s0 = light_field.centre
     number, centre = find_board(grey_view(light_field, t0, s0), target, light_field.source)
@@ -79,8 +79,8 @@ def find_corners(
         sure = _confidence(light_field, t, s, guess, reach)
         usable = sure >= options.least_weight
         if np.count_nonzero(usable) >= min(_LEAST_CORNERS, len(number)):
-            found = _refined(grey_view(light_field, t, s), guess, reach)
-            good = usable & (np.hypot(*(found - guess).T) < max(2 * options.agree_px, 0.25 * reach))
+            found, certain = saddle_points(grey_view(light_field, t, s), guess, reach)
+            good = usable & certain & (np.hypot(*(found - guess).T) < max(2 * options.agree_px, 0.25 * reach))
             places[t, s, good], weight[t, s, good] = found[good], sure[good]
             motion.add(offset, found, good)
         progress(done + 1, len(order))
@@ -117,7 +117,7 @@ def find_board(picture: UInt8, target: Target, source: str) -> Corners:
     number, place = found
     # Enlarging keeps the middles of pixels in proportion from their edges, not from their centres.
     place = (place + 0.5) / scale - 0.5
-    return number, _refined(picture, place, _window(place, number, target))
+    return number, saddle_points(picture, place, _window(place, number, target))[0]
 
 
 class _Motion:
@@ -184,13 +184,6 @@ def _window(place: Float64, number: np.ndarray[tuple[int], np.dtype[np.intp]], t
     gaps += [np.hypot(*(at[n + across] - p)) for n, p in at.items() if n + across in at]
     closest = float(np.percentile(gaps, 10)) if gaps else 5.0
     return max(2, min(8, int(share * closest)))
-
-
-def _refined(picture: UInt8, guess: Float64, reach: int) -> Float64:
-    stop = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, 40, 0.002)
-    start = np.ascontiguousarray(guess, np.float32).reshape(-1, 1, 2)
-    fine: Float64 = cv2.cornerSubPix(picture, start, (reach, reach), (-1, -1), stop).reshape(-1, 2).astype(np.float64)
-    return fine
 
 
 def _confidence(light_field: LightField, t: int, s: int, place: Float64, reach: int) -> Float64:

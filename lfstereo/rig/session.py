@@ -15,12 +15,13 @@ from lfstereo.lightfield.decoding import calibrate, views_from
 from lfstereo.lightfield.field import LightField
 from lfstereo.lightfield.store import SUFFIXES, read_light_field
 from lfstereo.progress import Progress, silent
-from lfstereo.rig.bundle import ShotPair, SizePair
+from lfstereo.rig.bundle import LensPair, ShotPair, SizePair
 from lfstereo.rig.corners import CornerOptions, find_corners
 from lfstereo.rig.geometry import Side
 from lfstereo.rig.rig import SensorGrid, StereoRig
 from lfstereo.rig.sightings import Sightings, merge_views
 from lfstereo.rig.target import Target
+from lfstereo.rig.thin_lens import ThinLens, thin_lens_of_metadata
 
 LensSteps = tuple[int | None, int | None]
 """Zoom and focus."""
@@ -42,6 +43,8 @@ class Session:
     """Zoom and focus step of the left and the right camera, where the captures tell."""
     grids: tuple[SensorGrid | None, SensorGrid | None] = (None, None)
     """The lattice of micro-images of the first shot of either camera."""
+    lenses: LensPair = (None, None)
+    """Either camera's lens as the metadata of raw captures tell."""
 
     def labelled(self, rig: StereoRig) -> StereoRig:
         """Return the rig with the zoom and focus steps and the lattices of micro-images that it holds for."""
@@ -107,6 +110,7 @@ def see_targets(
         unusable=tuple(unusable),
         steps=(sides[0].steps, sides[1].steps),
         grids=(sides[0].grid, sides[1].grid),
+        lenses=(sides[0].lens, sides[1].lens),
     )
 
 
@@ -131,6 +135,7 @@ class ShotSide:
     pixel_px: float = 1.0
     steps: LensSteps = (None, None)
     grid: SensorGrid | None = None
+    lens: ThinLens | None = None
     grids: dict[str, tuple[LensletGrid, Float32]] = field(default_factory=dict)
 
     def open(self, path: Path) -> LightField:
@@ -160,6 +165,7 @@ class ShotSide:
         self.steps = found.lens.zoom_step, found.lens.focus_step
         self._agree(path, (found.serial, (found.height, found.width), *self.steps))
         light_field = self._decoded(capture, path)
+        self.lens = thin_lens_of_metadata(found)
         self.size_px = (found.width, found.height)
         self.pixel_px = light_field.sampling.step_px[1] if light_field.sampling else 1.0
         return light_field

@@ -124,5 +124,6 @@ def _adjusted(shots: Sequence[Sightings], points: Float64, width: float, progres
         rotations=np.stack([pose[0] for pose in poses]),
         translations=np.stack([pose[1] for pose in poses]),
     )
-    model = LensModel(matrix_rays, np.ones(13, np.bool_), np.zeros(13), np.full(13, np.inf))
+    anything = np.full(13, np.inf)
+    model = LensModel(matrix_rays, np.ones(13, np.bool_), np.zeros(13), anything, -anything, anything)
     return adjust([model], points, [Seen(0, i, shot) for i, shot in enumerate(shots)], state, progress)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import cv2
@@ -13,6 +14,8 @@ from lfstereo.rig.sightings import Sightings
 
 _FOCALS_PER_EXTENT = np.geomspace(0.4, 25.0, 64)
 """Focal lengths to try, in widths of the image: fields of view of 100 to 2 degrees."""
+_FOCAL_STEP = 0.065
+"""Relative distance of neighbouring ones."""
 
 PoseGuess = tuple[Float64, Float64, float]
 """Rotation ``(3, 3)``, translation ``(3,)`` m, rms miss in px."""
@@ -21,17 +24,26 @@ _TURN_PER_MISS_RAD = 0.01
 """What a pose loses against another by fitting the corners worse by its own miss."""
 
 
-def start_focal_px(shots: Sequence[Sightings], points: Float64, centre: Float64, width_px: float) -> float:
-    """Return the focal length that explains the boards best, by trying them all.
+def start_focal_px(
+    shots: Sequence[Sightings],
+    points: Float64,
+    centre: Float64,
+    width_px: float,
+    between_px: tuple[float, float] | None = None,
+) -> float:
+    """Return the focal length that explains the boards best, by trying them all, or all within bounds.
 
     A search over the whole range stays real and positive whatever the boards; the closed forms from vanishing
     points take the root of a difference, which noise can turn negative.
     """
     totals = []
-    for focal in width_px * _FOCALS_PER_EXTENT:
+    focals = width_px * _FOCALS_PER_EXTENT
+    if between_px is not None:
+        focals = np.geomspace(*between_px, max(2, math.ceil(math.log(between_px[1] / between_px[0]) / _FOCAL_STEP) + 1))
+    for focal in focals:
         misses = [_poses(shot, points, focal, centre)[0][2] ** 2 for shot in shots]
         totals.append(float(np.mean(misses)))
-    return float(width_px * _FOCALS_PER_EXTENT[int(np.argmin(totals))])
+    return float(focals[int(np.argmin(totals))])
 
 
 def start_poses(shot: Sightings, points: Float64, focal: float, centre: Float64) -> list[PoseGuess]:

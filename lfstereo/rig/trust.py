@@ -98,3 +98,26 @@ def check_baseline(baseline_m: float, sd_m: float) -> None:
             f"expected {LARGEST_BASELINE_SD:.0%} or less; photograph more boards, larger in the picture, "
             "tilted and at different distances"
         )
+
+
+def check_lens_range(side: str, found: Float64, low: Float64, high: Float64) -> None:
+    """Refuse a lens at the end of what the captures' metadata allow.
+
+    Parameters
+    ----------
+    found, low, high
+        ``(11,)`` parameters of :func:`lfstereo.rig.intrinsics.plenoptic_rays` and their bounds.
+
+    Raises
+    ------
+    RigError
+        If the focal length, the plane of zero slope or the pupil lies at a bound.
+    """
+    names = {0: ("focal length", "px"), 1: ("focal length", "px"), 5: ("pupil", "m per px")}
+    for index, (name, unit) in names.items():
+        if not low[index] < found[index] < high[index]:
+            raise RigError(
+                f"calibration: the {side} camera's {name} comes out at {found[index]:.4g} {unit} or beyond, expected "
+                f"{low[index]:.4g} to {high[index]:.4g} from the metadata; measure square_m on the print, check that "
+                "the captures are of one zoom, or accept it with --any-lens"
+            )

@@ -8,7 +8,7 @@ import numpy as np
 
 from lfstereo.arrays import Float32, Float64
 from lfstereo.lightfield.field import LightField, ViewSampling
-from lfstereo.rig.distortion import distort
+from lfstereo.rig.distortion import distort, undistort
 from lfstereo.rig.geometry import RectifiedGeometry, Side
 from lfstereo.rig.rig import PlenopticCamera, StereoRig
 
@@ -70,6 +70,25 @@ def view_map(
     m = np.linalg.inv(sensor_from_view(light_field)) @ _sensor_from_direction(camera, pupil)
     x, y = (m[k, 0] * bent.x + m[k, 1] * bent.y + m[k, 2] for k in (0, 1))
     return x.astype(np.float32), y.astype(np.float32)
+
+
+def rectify_places(
+    places: Float64, offset_px: Float64, camera: PlenopticCamera, geometry: RectifiedGeometry, side: Side
+) -> Float64:
+    """Return where places ``(N, 2)`` on the sensor, seen from one view, lie in its rectified view, ``(N, 2)`` px.
+
+    Parameters
+    ----------
+    offset_px
+        ``(2,)`` position of the view inside the micro-images, sensor px from the centre.
+    """
+    pupil = np.array([*(camera.pupil_m_per_px * offset_px), 0.0])
+    ones = np.ones((len(places), 1))
+    bent = np.hstack([places, ones]) @ np.linalg.inv(_sensor_from_direction(camera, pupil)).T
+    ideal = np.stack(undistort(bent[:, 0], bent[:, 1], np.asarray(camera.distortion)), axis=1)
+    seen = np.hstack([ideal, ones]) @ np.linalg.inv(_direction_from_rectified(geometry, side, pupil)).T
+    rectified: Float64 = seen[:, :2] / seen[:, 2:]
+    return rectified
 
 
 def _pupil_point(light_field: LightField, camera: PlenopticCamera, t: float, s: float) -> Float64:

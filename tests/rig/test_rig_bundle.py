@@ -19,6 +19,7 @@ from lfstereo.rig.rig import PlenopticCamera, StereoRig, read_rig, write_rig
 from lfstereo.rig.sightings import Sightings
 from lfstereo.rig.start import start_poses, start_pupil
 from lfstereo.rig.target import Target
+from lfstereo.rig.thin_lens import ThinLens
 from lfstereo.rig.trust import check_baseline
 
 TARGET = Target("checkerboard", (13, 8), 0.020)
@@ -173,6 +174,32 @@ def test_refuses_corners_that_no_board_explains() -> None:
     nowhere = dataclasses.replace(pairs[0].left, place=pairs[0].left.place * np.nan)
     with pytest.raises(RigError, match=r"00_left: no pose of the board explains its corners; drop this shot"):
         start_poses(nowhere, TARGET.points, 14660.0, np.zeros(2))
+
+
+def lens_like(camera: PlenopticCamera, stretch: float = 1.0) -> ThinLens:
+    """Return what the metadata of a camera would say, its lenslets' distance stretched."""
+    return ThinLens(0.02, 0.02, 1.4e-6 * 0.02 / camera.pupil_m_per_px * stretch, 0.02, 1.4e-6)
+
+
+def test_a_calibration_within_its_bounds_is_what_it_is_without() -> None:
+    rng = np.random.default_rng(2)
+    pairs = shots(RIG, poses(8, rng), rng)
+    shown = (pairs, TARGET.points, (LEFT.sensor_px, RIGHT.sensor_px), 12.4)
+    bound = solve_rig(*shown, lenses=(lens_like(LEFT), lens_like(RIGHT)))
+    free = solve_rig(*shown)
+    assert bound.rig.baseline_m == pytest.approx(free.rig.baseline_m, rel=1e-4)
+    assert bound.rig.left.focal_px == pytest.approx(free.rig.left.focal_px, rel=1e-4)
+
+
+def test_a_board_of_other_squares_is_refused() -> None:
+    rng = np.random.default_rng(2)
+    pairs = shots(RIG, poses(8, rng), rng)
+    shown = (pairs, 2 * TARGET.points, (LEFT.sensor_px, RIGHT.sensor_px), 12.4)
+    lenses = (lens_like(LEFT), lens_like(RIGHT))
+    with pytest.raises(RigError, match=r"the left camera's pupil comes out at .* measure square_m on the print"):
+        solve_rig(*shown, lenses=lenses)
+    accepted = solve_rig(*shown, RigOptions(any_lens=True), lenses=lenses)
+    assert accepted.rig.baseline_m == pytest.approx(2 * RIG.baseline_m, rel=0.005)
 
 
 def test_ordinary_stereo_pairs_agree_with_the_published_rig(real_data: Path) -> None:
