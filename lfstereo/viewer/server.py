@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 import secrets
+import sys
 import threading
 from dataclasses import dataclass
 from http import HTTPStatus
@@ -102,6 +103,11 @@ class PageServer(ThreadingHTTPServer):
             self._open = None
             self._open = index, open_item(self.items[index], self.whites)
         return self._open[1]
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """Say nothing of a browser that hung up, as it does when a page is left."""
+        if not isinstance(sys.exception(), ConnectionError):
+            super().handle_error(request, client_address)
 
     def _index(self, text: str) -> int:
         if not (text.isascii() and text.isdigit() and int(text) < len(self.items)):

@@ -157,6 +157,15 @@ def test_impossible_wishes(server: PageServer, query: str, message: str) -> None
     assert message in body.decode()
 
 
+def test_a_browser_that_hangs_up_is_no_fault(server: PageServer, capsys: pytest.CaptureFixture[str]) -> None:
+    for fault in (BrokenPipeError(), KeyError("a bug")):
+        try:
+            raise fault
+        except (BrokenPipeError, KeyError):
+            server.handle_error(None, ("127.0.0.1", 1))
+        assert ("a bug" in capsys.readouterr().err) == isinstance(fault, KeyError)
+
+
 def test_command_refuses(
     tmp_path: Path, result_folder: Path, server: PageServer, capsys: pytest.CaptureFixture[str]
 ) -> None:
