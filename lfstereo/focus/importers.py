@@ -219,10 +219,11 @@ def _read_picture(path: Path) -> Rgb:
         with path.open("rb") as file:
             head = file.read(_PNG_DEPTH_BYTE + 1)
         deep_png = path.suffix.lower() == ".png" and head[_PNG_DEPTH_BYTE:] == bytes([_PNG_DEEP])
-        tiff = path.suffix.lower() in (".tif", ".tiff")
-        plugin: dict[str, Any] = (
-            {"plugin": "opencv"} if deep_png else {} if tiff else {"plugin": "pillow", "rotate": True}
-        )
+        plugin: dict[str, Any] = {"plugin": "pillow", "rotate": True}
+        if deep_png:  # which Pillow would bring to 8 bits
+            plugin = {"plugin": "opencv", "flags": cv2.IMREAD_COLOR | cv2.IMREAD_ANYDEPTH}
+        elif path.suffix.lower() in (".tif", ".tiff"):
+            plugin = {"plugin": "tifffile"}
         pixels = np.asarray(iio.imread(path, **plugin))
     except Exception as error:  # every decoder has its own kinds
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
