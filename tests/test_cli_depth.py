@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import re
 import tomllib
 from pathlib import Path
 
@@ -201,3 +202,53 @@ def test_real_sweeps_come_out_right(real_data: Path, tmp_path: Path) -> None:
     theirs = cv2.imread(str(sweep / "aif" / "afocus.png"))[..., ::-1]
     small = cv2.resize(srgb_to_linear(theirs.copy()), fused.shape[1::-1], interpolation=cv2.INTER_AREA)
     assert np.median(np.abs(fused - small)) < 0.02  # of white
+
+
+def office_cameras(office: Path, path: Path) -> None:
+    """Write the pair's geometry for OpenCV: POV-Ray spans the image plane by ``right`` and ``up``, in cm, y upwards."""
+    poses = []
+    for n in (1, 2):
+        text = (office / f"office_stereo{n}" / f"office_stereo{n}.txt").read_text("utf-8")
+        place, ahead, up, right = (
+            np.array(re.search(rf"cam_{name}\s*=\s*\[([^\]]*)\]", text)[1].split(), float)
+            for name in ("pos", "dir", "up", "right")
+        )
+        across, down = right / np.linalg.norm(right), -up / np.linalg.norm(up)
+        axes = np.stack([across, down, np.cross(down, across)])  # a left-handed world
+        focal = axes[2] @ ahead / np.linalg.norm(right) * 1080
+        centre = (
+            539.5 - focal * (across @ ahead) / (axes[2] @ ahead),
+            359.5 - focal * (down @ ahead) / (axes[2] @ ahead),
+        )
+        poses.append((place, axes, np.array([[focal, 0, centre[0]], [0, focal, centre[1]], [0, 0, 1]])))
+    file = cv2.FileStorage(str(path), cv2.FILE_STORAGE_WRITE)
+    file.write("image_width", 1080)
+    file.write("image_height", 720)
+    for n, (_, _, matrix) in enumerate(poses, 1):
+        file.write(f"M{n}", matrix)
+        file.write(f"D{n}", np.zeros((1, 5)))
+    file.write("R", poses[1][1] @ poses[0][1].T)
+    file.write("T", (poses[1][1] @ (poses[0][0] - poses[1][0]) / 100)[:, None])
+    file.release()
+
+
+def test_office_pair(real_data: Path, tmp_path: Path) -> None:
+    """Two focus settings of either camera, against matching the pictures of the same scene without any blur."""
+    office = real_data / "focal" / "devernay_office_breakfast" / "office"
+    office_cameras(office, tmp_path / "cameras.yml")
+    for kind, settings in (("sweep", ("near2", "far2")), ("sharp", ("all", "all"))):
+        for n, side in ((1, "left"), (2, "right")):
+            folder = tmp_path / f"{kind}_{side}"
+            folder.mkdir()
+            for k, setting in enumerate(settings):
+                (folder / f"{k}.png").symlink_to(office / f"office_stereo{n}" / f"office_stereo{n}_{setting}.png")
+        ends = ["--rig", str(tmp_path / "cameras.yml"), "--near-m", "1.5", "--far-m", "10", "--width-px", "540"]
+        folders = [str(tmp_path / f"{kind}_{side}") for side in ("left", "right")]
+        assert main(["depth", *folders, *ends, "-o", str(tmp_path / kind)]) == 0
+    maps = [read_pfm(tmp_path / kind / "disparity.pfm") for kind in ("sweep", "sharp")]
+    both = maps[0][1] & maps[1][1]
+    assert both.mean() > 0.7
+    error = np.abs(maps[0][0] - maps[1][0])[both]
+    assert np.median(error) < 0.1 and np.mean(error > 1) < 0.05  # px of 540 across
+    pictures = [cv2.imread(str(tmp_path / kind / "all_in_focus.png")).astype(float) for kind in ("sweep", "sharp")]
+    assert np.median(np.abs(pictures[0] - pictures[1])[both]) < 6  # of 255
