@@ -17,6 +17,8 @@ TAR_SUFFIX = ".tar"
 _VOLUME_NAME = re.compile(r"\.C\.\d+$", re.IGNORECASE)
 """The desktop program of the first camera keeps its backup in ``data.C.0`` and the volumes that follow."""
 _DRIVE = re.compile(r"^[A-Za-z]:")
+_UNFINISHED = ".partial"
+"""How `lfstereo.outputs` names what it has not finished."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,6 +74,11 @@ def is_archive(path: Path) -> bool:
     return path.suffix.lower() == TAR_SUFFIX or _VOLUME_NAME.search(path.name) is not None
 
 
+def finished_files(folder: Path) -> list[Path]:
+    """Return the files in and below a folder, sorted, without those that another process is still writing."""
+    return sorted(p for p in folder.rglob("*") if not p.name.endswith(_UNFINISHED) and p.is_file())
+
+
 def list_members(place: Path) -> Iterator[Member]:
     """Yield the files of a folder and of all archives in it, or of one archive, sorted by path.
 
@@ -89,7 +96,7 @@ def list_members(place: Path) -> Iterator[Member]:
         If an archive is damaged, or a volume is missing.
     """
     if place.is_dir():
-        for path in sorted(p for p in place.rglob("*") if p.is_file()):
+        for path in finished_files(place):
             inside = path.relative_to(place)
             if is_archive(path):
                 yield from (_moved(member, inside.parent) for member in _archive_members(path))

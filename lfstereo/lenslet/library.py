@@ -22,7 +22,7 @@ from lfstereo.container.factory_files import (
     parse_manifest,
     parse_serial,
 )
-from lfstereo.container.members import Member, is_archive, list_members
+from lfstereo.container.members import Member, finished_files, is_archive, list_members
 from lfstereo.container.metadata import FrameMetadata, parse_metadata
 from lfstereo.container.reader import parse_json
 from lfstereo.errors import AssetError, InputError
@@ -30,7 +30,7 @@ from lfstereo.lenslet.home import remembered
 
 _CAMERA_NAME_PART = "MOD_"
 """Part of the file name that the cameras give their white images."""
-_LAYOUT = 2
+_LAYOUT = 3
 """To be raised when the stored index changes its form."""
 
 
@@ -142,10 +142,12 @@ def open_library(place: Path) -> WhiteLibrary:
     """
     if not place.is_dir() and not (place.is_file() and is_archive(place)):
         raise AssetError(f"{place}: found no such folder, expected the camera's white images; check the path")
-    files = sorted(p for p in place.rglob("*") if p.is_file()) if place.is_dir() else [place]
+    files = finished_files(place) if place.is_dir() else [place]
     state = [(str(path.resolve()), path.stat().st_size, path.stat().st_mtime_ns) for path in files]
-    name = hashlib.sha256(repr((_LAYOUT, str(place.resolve()), state)).encode()).hexdigest()
-    found = remembered(f"index-{name[:32]}", lambda: _to_json(_index(place)), lambda stored: "whites" in stored)
+    # Whole paths, as the index is read again from other working folders.
+    whole = place.resolve()
+    name = hashlib.sha256(repr((_LAYOUT, str(whole), state)).encode()).hexdigest()
+    found = remembered(f"index-{name[:32]}", lambda: _to_json(_index(whole)), lambda stored: "whites" in stored)
     return _from_json(found, place)
 
 

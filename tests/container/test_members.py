@@ -40,6 +40,7 @@ def test_folder(tmp_path: Path) -> None:
     (tmp_path / "a" / "b").mkdir(parents=True)
     (tmp_path / "a" / "b" / "MOD_0001.RAW").write_bytes(RAW)
     (tmp_path / "MOD_0001.TXT").write_bytes(TEXT)
+    (tmp_path / ".MOD_0002.RAW.1a2b3c4d.partial").write_bytes(RAW)
     assert contents(tmp_path) == {"a/b/MOD_0001.RAW": RAW, "MOD_0001.TXT": TEXT}
 
 

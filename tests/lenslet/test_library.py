@@ -85,6 +85,17 @@ def test_damaged_archive_is_refused(tmp_path: Path, camera_files: SimpleNamespac
         open_library(tar)
 
 
+def test_index_holds_from_another_working_folder(
+    tmp_path: Path, camera_files: SimpleNamespace, small_white: Capture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    camera_files.put(tmp_path / "here" / "whites", "MOD_0001", small_white)
+    monkeypatch.chdir(tmp_path / "here")
+    assert len(open_library(Path("whites")).whites) == 1
+    monkeypatch.chdir(tmp_path)
+    (white,) = open_library(Path("here/whites")).whites
+    assert (white.read().mosaic == small_white.mosaic).all()
+
+
 def test_a_file_is_no_library(tmp_path: Path) -> None:
     (tmp_path / "a.zip").touch()
     with pytest.raises(AssetError, match="found no such folder"):
