@@ -23,6 +23,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "target": ("lfstereo.cli.target", "draw a calibration board to print, and its TOML file"),
     "calibrate": ("lfstereo.cli.calibrate", "photographs of a calibration board by both cameras to a rig"),
     "rig": ("lfstereo.cli.rig", "a rig to and from the files of OpenCV, Kalibr and others"),
+    "rectify": ("lfstereo.cli.rectify", "one light field rectified by the calibration of the Light Field Toolbox"),
     "decode": ("lfstereo.cli.decode", "raw capture to 4-D light field"),
     "whites": ("lfstereo.cli.whites", "the white images: import them, list them, check their grids"),
     "view-grid": ("lfstereo.cli.view_grid", "picture of a lenslet grid over its frame, and of what it leaves"),
