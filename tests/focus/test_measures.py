@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import importlib.util
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from lfstereo.errors import ConfigError, ShapeError
-from lfstereo.focus.measures import METHODS, FocusOptions, Method, blend_slices, depth_from_focus
+from lfstereo.focus.importers import read_sweep
+from lfstereo.focus.measures import METHODS, FocusOptions, Method, blend_slices, depth_from_focus, find_focus
 from lfstereo.focus.nayar1992 import modified_laplacian
 from lfstereo.focus.refocus import render_stack, slice_disparities
 from lfstereo.focus.stack import FocalStack
 from lfstereo.lightfield.field import LightField
 
-
+ROOT = Path(__file__).resolve().parents[2]
 VARIATIONAL_PX = 0.08
 """Of slices 0.25 px apart: its polynomial of degree 8 does not peak where the Gaussian does."""
 
@@ -123,3 +127,43 @@ def test_refuses_two_slices() -> None:
 def test_refuses_impossible_options(options: FocusOptions) -> None:
     with pytest.raises(ConfigError, match=r"(window_px|blur_px|radius_px|edge_share|tv_strength|iterations|method) = "):
         depth_from_focus(FocalStack(np.zeros((3, 4, 4, 3), np.float32), np.float32([2, 1, 0]), 0.1, "test"), options)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_frames_in_focus_of_a_generated_stack(real_data: Path, method: Method) -> None:
+    """41 frames whose frame in focus is known; the truth is a pickle, of which arrays alone are read."""
+    spec = importlib.util.spec_from_file_location("bench", ROOT / "benchmarks" / "bench_depth_from_focus.py")
+    assert spec is not None and spec.loader is not None
+    bench = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(bench)
+    folder = real_data / "focal" / "corentincou_gen" / "1"
+    with (folder / "reference.pkl").open("rb") as file:
+        truth = -np.asarray(bench.Arrays(file).load())
+    found = find_focus(read_sweep(folder).slices, FocusOptions(method=method))
+    error = np.abs(found.slice_index[20:379, 20:379] - truth)
+    assert np.median(error) < 0.3  # frames
+    assert np.mean(error > 3) < 0.001
+
+
+def test_noise_alone_is_not_sure_and_texture_in_focus_is() -> None:
+    rng = np.random.default_rng(1)
+    slices = (0.3 + 0.01 * rng.standard_normal((9, 60, 80, 3))).astype(np.float32)
+    slices[4, :, 40:] += 0.1 * rng.standard_normal((60, 40, 1)).astype(np.float32)
+    found = find_focus(slices)
+    assert found.valid[8:-8, 8:28].mean() < 0.02  # 1 in 1000, and windows that are not independent
+    assert found.valid[:, 48:].all()
+    np.testing.assert_allclose(found.slice_index[:, 56:], 4.0, atol=0.1)
+
+
+def test_two_slices_are_told_apart() -> None:
+    rng = np.random.default_rng(1)
+    slices = np.full((2, 40, 40, 3), 0.3, np.float32)
+    slices[0, :, :20] += 0.1 * rng.standard_normal((40, 20, 1)).astype(np.float32)
+    slices[1, :, 20:] += 0.1 * rng.standard_normal((40, 20, 1)).astype(np.float32)
+    found = find_focus(slices, FocusOptions(method="moeller2015"))
+    assert (found.slice_index[:, 2:14] == 0).all() and (found.slice_index[:, 26:38] == 1).all()
+
+
+def test_refuses_one_slice() -> None:
+    with pytest.raises(ShapeError, match=r"expected \(K, V, U, 3\) with two or more"):
+        find_focus(np.zeros((1, 4, 4, 3), np.float32))
