@@ -49,7 +49,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--zoom", type=int, default=1, help="times each view's line is repeated in an epipolar-plane image"
     )
-    add_arguments(parser.add_argument_group("quilt"), QuiltOptions)
+    add_arguments(parser.add_argument_group("quilt"), QuiltOptions)  # type: ignore[arg-type]
 
 
 def run(arguments: argparse.Namespace) -> int:

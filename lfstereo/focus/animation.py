@@ -129,7 +129,8 @@ def write_animation(path: Path, frames: Iterator[UInt8], fps: float, force: bool
     with atomic_file(path, force) as scratch:
         named = scratch.with_suffix(suffix)
         try:
-            with imageio.get_writer(named, format="FFMPEG" if suffix == ".mp4" else "GIF", **settings) as writer:
+            writer: Any = imageio.get_writer(named, format="FFMPEG" if suffix == ".mp4" else "GIF", **settings)
+            with writer:
                 for frame in frames:
                     writer.append_data(frame if suffix == ".gif" else _even(frame))
                     count += 1

@@ -69,8 +69,8 @@ def aperture_weights(light_field: LightField, options: RefocusOptions = RefocusO
         weights = _from_picture(options.aperture_picture, (count_t, count_s))
     else:
         t0, s0 = light_field.centre
-        x = np.arange(count_s)[None, :] - s0 - options.centre_views[0]
-        y = np.arange(count_t)[:, None] - t0 - options.centre_views[1]
+        x: Float64 = np.arange(count_s, dtype=np.float64)[None, :] - s0 - options.centre_views[0]
+        y: Float64 = np.arange(count_t, dtype=np.float64)[:, None] - t0 - options.centre_views[1]
         radius = _radius_views(light_field, options)
         beyond = np.hypot(x, y) - radius if options.aperture == "disc" else _beyond_polygon(x, y, radius, options)
         weights = np.clip(0.5 - beyond, 0.0, 1.0).astype(np.float32)
@@ -136,7 +136,8 @@ def _beyond_polygon(x: Float64, y: Float64, radius: float, options: RefocusOptio
     normals = options.turn_rad + (np.arange(options.blades) + 0.5) * 2 * np.pi / options.blades
     reach = (np.cos(a) * x + np.sin(a) * y for a in normals)
     farthest: Float64 = np.maximum.reduce([np.broadcast_to(r, np.broadcast_shapes(x.shape, y.shape)) for r in reach])
-    return farthest - radius * np.cos(np.pi / options.blades)
+    beyond: Float64 = farthest - radius * np.cos(np.pi / options.blades)
+    return beyond
 
 
 def _from_picture(path: Path | None, count: tuple[int, int]) -> Float32:

@@ -103,7 +103,7 @@ def filter_views(
     t, s, v, u = (n + m for n, m in zip((count_t, count_s, rows, columns), margins, strict=True))
     share = np.ones(views.shape[:4], np.float32) if weight is None else weight
     brightest = max(1.0, float(views.max(initial=0)))
-    stages = [((t, s, v, u), (0, 1, 2, 3))]
+    stages: list[tuple[tuple[int, int, int, int], tuple[int, ...]]] = [((t, s, v, u), (0, 1, 2, 3))]
     if options.kind == "line":
         stages = [((t, 1, v, 1), (0, 2)), ((1, s, 1, u), (1, 3))]
     for n, (size, axes) in enumerate(stages):
@@ -201,7 +201,8 @@ def _falling(squared: Float32, options: FilterOptions) -> Float32:
     if options.rolloff == "gaussian":
         gauss: Float32 = np.exp(squared * np.float32(-0.5 * np.log(2) / options.bandwidth**2))
         return gauss
-    butterworth: Float32 = 1 / np.sqrt(1 + (squared * np.float32(1 / options.bandwidth**2)) ** options.order)
+    ratio = squared * np.float32(1 / options.bandwidth**2)
+    butterworth: Float32 = (1 / np.sqrt(1 + ratio**options.order)).astype(np.float32)
     return butterworth
 
 

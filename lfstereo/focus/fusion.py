@@ -47,7 +47,7 @@ def fuse_slices(slices: Float32) -> Rgb:
         raise ShapeError(f"slices: found an array of shape {slices.shape}, expected (K, V, U, 3) with at least one")
     levels = max(0, int(np.log2(max(min(slices.shape[1:3]) / _SMALLEST_PX, 1))))
     pyramids = [_details(slice_, levels) for slice_ in slices]
-    picture = np.mean([pyramid[-1] for pyramid in pyramids], axis=0, dtype=np.float32)
+    picture: Float32 = np.mean(np.stack([pyramid[-1] for pyramid in pyramids]), axis=0)
     for level in reversed(range(levels)):
         details = np.stack([pyramid[level] for pyramid in pyramids])
         contrast = np.stack([_contrast(detail) for detail in details])

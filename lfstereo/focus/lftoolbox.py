@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -181,12 +181,22 @@ def _median(shifted: Float32) -> Float32:
     return middle
 
 
-_REDUCTIONS = {
-    "sum": lambda shifted: np.nansum(shifted, axis=0),
-    "median": _median,
-    "max": lambda shifted: np.fmax.reduce(shifted, axis=0),
-    "min": lambda shifted: np.fmin.reduce(shifted, axis=0),
-}
+def _sum(shifted: Float32) -> Float32:
+    total: Float32 = np.nansum(shifted, axis=0)
+    return total
+
+
+def _max(shifted: Float32) -> Float32:
+    largest: Float32 = np.fmax.reduce(shifted, axis=0)
+    return largest
+
+
+def _min(shifted: Float32) -> Float32:
+    smallest: Float32 = np.fmin.reduce(shifted, axis=0)
+    return smallest
+
+
+_REDUCTIONS: dict[str, Callable[[Float32], Float32]] = {"sum": _sum, "median": _median, "max": _max, "min": _min}
 
 
 def _divided(picture: Float32) -> ShiftSum:

@@ -127,7 +127,8 @@ def _mirrored(index: Index, count: int) -> Index:
 
 def _phases(frequencies: Float64, shifts_px: Float64) -> Complex64:
     """Return ``(shifts, frequencies)`` factors that move a signal to larger coordinates by each shift."""
-    return np.exp(-2j * np.pi * shifts_px[:, None] * frequencies[None, :]).astype(np.complex64)
+    phases: Complex64 = np.exp(-2j * np.pi * shifts_px[:, None] * frequencies[None, :]).astype(np.complex64)
+    return phases
 
 
 def _colours(picture: Float32, total: float, light_field: LightField, view: tuple[int, int]) -> Float32:

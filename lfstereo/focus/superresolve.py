@@ -70,7 +70,7 @@ def superresolve(light_field: LightField, slope: float, factor: int, options: Re
     weight = np.empty((0, 0, 0, 0), np.uint8) if light_field.weight is None else light_field.weight.copy()
     if light_field.weight is not None and options.least_weight > 0:
         weight[weight < 255 * options.least_weight] = 0
-    prior = np.float32(_PRIOR_SHARE * aperture.sum() / factor**2)
+    prior = _PRIOR_SHARE * float(aperture.sum()) / factor**2
     views = np.ascontiguousarray(light_field.views)
     _gather(views, weight, aperture, float(slope), light_field.centre, factor, prior, smooth)
     return smooth
@@ -112,6 +112,7 @@ def _gather(
     rows = views.shape[2]
     for fine in numba.prange(picture.shape[0]):
         total = np.zeros((picture.shape[1], 4), np.float32)
+        extra = np.float32(prior)
         for t in range(views.shape[0]):
             # View row v falls on fine row factor * (v + slope (t - t0) + 1/2) - 1/2.
             at = (fine + 0.5) / factor - 0.5 - slope * (t - centre[0])
@@ -126,4 +127,4 @@ def _gather(
                         _add_row(views[t, s, v], of_row, gain * aperture[t, s], first, factor, total)
         for x in range(picture.shape[1]):
             for c in range(3):
-                picture[fine, x, c] = (total[x, c] + prior * picture[fine, x, c]) / (total[x, 3] + prior)
+                picture[fine, x, c] = (total[x, c] + extra * picture[fine, x, c]) / (total[x, 3] + extra)

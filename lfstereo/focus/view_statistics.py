@@ -113,7 +113,7 @@ def _sample(view: Float32, weight: UInt8, y: float, x: float, cubic: bool, gains
             total += gain
             for c in range(3):
                 value[c] += gain * view[v, u, c]
-    return total
+    return float(total)
 
 
 @compiled()
@@ -129,9 +129,9 @@ def _weighted_median(values: Float32, shares: Float32) -> float:
         below += shares[order[n]]
         if below >= half * (1 - 1e-6):
             if below <= half * (1 + 1e-6) and n + 1 < order.shape[0]:
-                return 0.5 * (values[order[n]] + values[order[n + 1]])
-            return values[order[n]]
-    return values[order[-1]]
+                return float(0.5 * (values[order[n]] + values[order[n + 1]]))
+            return float(values[order[n]])
+    return float(values[order[-1]])
 
 
 @compiled()
@@ -139,20 +139,20 @@ def _reduced(values: Float32, shares: Float32, kind: int) -> float:
     if kind == 1:
         return _weighted_median(values, shares)
     if kind == 2:
-        return values.max()
+        return float(values.max())
     if kind == 3:
-        return values.min()
+        return float(values.min())
     total, mean = np.float32(0.0), np.float32(0.0)
     for n in range(values.shape[0]):
         total += shares[n]
         mean += shares[n] * values[n]
     mean /= total
     if kind == 0:
-        return mean
+        return float(mean)
     spread = np.float32(0.0)
     for n in range(values.shape[0]):
         spread += shares[n] * (values[n] - mean) ** 2
-    return np.sqrt(spread / total)
+    return float(np.sqrt(spread / total))
 
 
 @compiled(parallel=True)

@@ -157,8 +157,7 @@ def _moved(picture: Float32, right_px: float, down_px: float) -> Float32:
         return picture
     rows, columns = picture.shape[:2]
     x, y = np.arange(columns, dtype=np.float32) - right_px, np.arange(rows, dtype=np.float32) - down_px
-    maps = np.broadcast_to(x, (rows, columns)), np.broadcast_to(y[:, None], (rows, columns))
-    moved: Float32 = cv2.remap(
-        picture, *(np.ascontiguousarray(m) for m in maps), cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
-    )
+    map_x = np.ascontiguousarray(np.broadcast_to(x, (rows, columns)))
+    map_y = np.ascontiguousarray(np.broadcast_to(y[:, None], (rows, columns)))
+    moved: Float32 = cv2.remap(picture, map_x, map_y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
     return moved

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
+import cv2
 import imageio.v2 as imageio
 import numpy as np
 import pytest
@@ -15,6 +16,16 @@ from lfstereo.focus.aperture import RefocusOptions
 from lfstereo.focus.refocus import refocus
 from lfstereo.lightfield.encoding import srgb8
 from lfstereo.lightfield.field import LightField
+
+
+def read_frames(path: Path) -> list[np.ndarray]:
+    if path.suffix == ".gif":
+        return list(imageio.mimread(path))
+    video, frames = cv2.VideoCapture(str(path)), []
+    while (read := video.read())[0]:
+        frames.append(read[1][..., ::-1])
+    video.release()
+    return frames
 
 
 @pytest.fixture
@@ -46,7 +57,7 @@ def test_writes_what_others_read(name: str, field: LightField, tmp_path: Path) -
     options = AnimationOptions(frames=6, width_px=32)
     frames = list(sweep_frames(field, 1.0, -1.0, options))
     assert write_animation(tmp_path / name, iter(frames), options.fps) == 6
-    found = imageio.mimread(tmp_path / name)
+    found = read_frames(tmp_path / name)
     assert len(found) == 6 and found[0].shape[1] == 32
     assert np.abs(found[3][:20, :, :3].astype(int) - frames[3][:20]).mean() < 16
     assert sorted(p.name for p in tmp_path.iterdir()) == [name]
