@@ -6,17 +6,21 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from lfstereo.arrays import Float64, UInt8
 from lfstereo.outputs import atomic_file
 from lfstereo.rig.adjust import points_in_camera
 from lfstereo.rig.bundle import RigSolution
+from lfstereo.rig.rig import PlenopticCamera
 
 _WIDTH, _PANEL, _GAP = 1400, 440, 30
 _INK, _LEFT, _RIGHT, _BAD = (40, 40, 40), (180, 90, 20), (30, 110, 200), (40, 40, 200)
 """Blue-green-red."""
 _SIDES = ("left", "right")
 _CELLS = (12, 8)
+_VIEW_FROM_DEG = (38.0, 24.0)
+"""The drawing's turn about the vertical, then about the horizontal."""
 
 
 def write_report(path: Path, solution: RigSolution, points: Float64, force: bool = False) -> None:
@@ -50,7 +54,7 @@ def draw_report(solution: RigSolution, points: Float64) -> UInt8:
         page[below : below + _PANEL, x : x + half] = _residual_map(solution, side, half)
     below = top + 2 * (_PANEL + _GAP)
     page[below : below + _PANEL, _GAP : _GAP + half] = _bars(solution, half)
-    page[below : below + _PANEL, 2 * _GAP + half : 2 * _GAP + 2 * half] = _from_above(solution, points, half)
+    page[below : below + _PANEL, 2 * _GAP + half : 2 * _GAP + 2 * half] = _in_space(solution, points, half)
     return page
 
 
@@ -122,27 +126,54 @@ def _bars(solution: RigSolution, width: int) -> UInt8:
     return panel
 
 
-def _from_above(solution: RigSolution, points: Float64, width: int) -> UInt8:
-    """Draw the boards seen from above: x to the right, distance upwards."""
-    state = solution.adjustment.state
-    boards = [points_in_camera(state, points, 0, n)[:, [0, 2]] for n in range(len(solution.pairs))]
-    right = solution.rig.right_centre_m[[0, 2]]
-    everything = np.concatenate([*boards, [[0, 0], right]])
+def _in_space(solution: RigSolution, points: Float64, width: int) -> UInt8:
+    """Draw boards and cameras in space, seen from behind the rig, above and to the left of it."""
+    state, count = solution.adjustment.state, len(solution.pairs)
+    worst = max(solution.errors, key=lambda error: error.rms_px).name
+    outline = _outline(points)
+    boards = [_seen(points_in_camera(state, outline, 0, n)) for n in range(count)]
+    reach = 0.3 * max(points_in_camera(state, points, 0, n)[:, 2].max() for n in range(count))
+    cameras = []
+    for centre, turn, camera in (
+        (np.zeros(3), np.eye(3), solution.rig.left),
+        (solution.rig.right_centre_m, solution.rig.right_from_left, solution.rig.right),
+    ):
+        cameras.append(_seen(centre + _frustum(camera, reach) @ turn))
+    everything = np.concatenate([*boards, *cameras])
     low, high = everything.min(axis=0), everything.max(axis=0)
-    scale = float(min((width - 40) / (high - low)[0], (_PANEL - 70) / (high - low)[1]))
-    first = (width - (high - low)[0] * scale) / 2
-    panel = _panel(f"boards and cameras from above; {low[1]:.2f} to {high[1]:.2f} m", width)
-
-    def at(place: Float64) -> tuple[int, int]:
-        return _point((first + (place[0] - low[0]) * scale, _PANEL - 20 - (place[1] - low[1]) * scale))
-
-    for board in boards:
-        hull = cv2.convexHull(np.array([at(place) for place in board], np.int32))
-        cv2.polylines(panel, [hull], True, _INK, 1, cv2.LINE_AA)
-    for centre, turn, colour in ((np.zeros(2), np.eye(3), _LEFT), (right, solution.rig.right_from_left, _RIGHT)):
-        cv2.circle(panel, at(centre), 5, colour, -1, cv2.LINE_AA)
-        cv2.line(panel, at(centre), at(centre + 0.25 * high[1] * turn[2, [0, 2]]), colour, 1, cv2.LINE_AA)
+    scale = float(min((width - 40) / (high - low)[0], (_PANEL - 60) / (high - low)[1]))
+    first = np.array([(width - (high - low)[0] * scale) / 2, 40.0])
+    panel = _panel("boards and cameras in space, seen from behind; the worst shot's board in red", width)
+    for number, board in enumerate(boards):
+        places = np.rint(first + (board - low) * scale).astype(np.int32)
+        bad = solution.pairs[number].name == worst
+        cv2.polylines(panel, [places], True, _BAD if bad else _INK, 1 + bad, cv2.LINE_AA)
+        _text(panel, solution.pairs[number].name[-4:], (int(places[0, 0]), int(places[0, 1])), 0.35)
+    for camera_lines, colour in zip(cameras, (_LEFT, _RIGHT), strict=True):
+        places = np.rint(first + (camera_lines - low) * scale).astype(np.int32)
+        for corner in places[1:]:
+            cv2.line(panel, places[0].tolist(), corner.tolist(), colour, 1, cv2.LINE_AA)
+        cv2.polylines(panel, [places[1:]], True, colour, 1, cv2.LINE_AA)
     return panel
+
+
+def _seen(places: Float64) -> Float64:
+    """Return where points in left camera axes lie in the drawing, ``(N, 2)``: parallel rays, from behind and above."""
+    turned: Float64 = places @ Rotation.from_euler("yx", _VIEW_FROM_DEG, degrees=True).as_matrix().T
+    return turned[:, :2]
+
+
+def _outline(points: Float64) -> Float64:
+    (x, y, _), (right, bottom, _) = points.min(axis=0), points.max(axis=0)
+    return np.array([[x, y, 0.0], [right, y, 0.0], [right, bottom, 0.0], [x, bottom, 0.0]])
+
+
+def _frustum(camera: PlenopticCamera, reach_m: float) -> Float64:
+    """Return the pupil and the corners of the field of view at a depth, ``(5, 3)`` m in camera axes."""
+    (width, height), (fx, fy), (cx, cy) = camera.sensor_px, camera.focal_px, camera.principal_px
+    ends = [(0, 0), (width, 0), (width, height), (0, height)]
+    rays = [[(x - cx) / fx, (y - cy) / fy, 1.0] for x, y in ends]
+    return np.array([[0.0, 0.0, 0.0], *rays]) * reach_m
 
 
 def _point(place: Float64 | tuple[float, float]) -> tuple[int, int]:
