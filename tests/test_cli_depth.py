@@ -121,6 +121,20 @@ def test_two_rectified_sweeps(two: Path, tmp_path: Path) -> None:
     assert not (tmp_path / "out" / "slice_index.pfm").exists()
 
 
+def test_two_dense_sweeps_by_the_network(tmp_path: Path) -> None:
+    """31 slices, twice as dense as the network's 16; its error here is that of the shipped weights."""
+    focused, wide = np.linspace(40, 20, 31), board()
+    for side, first in (("left", 10), ("right", 40)):
+        write_sweep(tmp_path / side, wide[:, first : first + SIZE[1]], np.full(SIZE, 30.0), focused)
+    table = write_table(tmp_path / "focus.csv", focused)
+    arguments = [str(tmp_path / "left"), str(tmp_path / "right"), "--distances", str(table), "--match", "network"]
+    geometry = ["--baseline-m", "0.1", "--focal-px", "400", "--device", "cpu"]
+    assert main(["depth", *arguments, *geometry, "-o", str(tmp_path / "out")]) == 0
+    disparity, valid = read_pfm(tmp_path / "out" / "disparity.pfm")
+    assert np.median(np.abs(disparity - 30)[valid]) < 2  # px
+    assert len(tomllib.loads((tmp_path / "out" / "run.toml").read_text("utf-8"))["sha256"]["weights"]) == 64
+
+
 def test_two_sweeps_of_toed_in_cameras(two: Path, tmp_path: Path) -> None:
     """The pictures of the wall seen through cameras that are turned towards each other by 2 degrees each."""
     turn = [cv2.Rodrigues(np.array([0.0, np.radians(a), 0.0]))[0] for a in (2.0, -2.0)]  # camera from world
