@@ -192,7 +192,9 @@ def _from_fan(axes: Axes, pair: int, near: float, far: float) -> Float32:
 def _from_hypercone(axes: Axes) -> Float32:
     """Squared distance from ``t u = s v``, where the spectra of all slopes lie."""
     t, s, v, u = axes
-    squared: Float32 = (np.sqrt((t + u) ** 2 + (s - v) ** 2) - np.sqrt((s + v) ** 2 + (t - u) ** 2)) ** 2 / 4
+    one: Float32 = np.hypot(t + u, s - v)
+    other: Float32 = np.hypot(s + v, t - u)
+    squared: Float32 = (one - other) ** 2 / np.float32(4)
     return squared
 
 

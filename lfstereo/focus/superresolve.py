@@ -25,7 +25,8 @@ def superresolve(light_field: LightField, slope: float, factor: int, options: Re
 
     Every sample of every view is put where it falls on the fine grid, shared between the four pixels around it; the
     mean of what falls on a pixel is shown. Where no sample comes near, as at slope 0 where all views coincide, the
-    refocused picture is interpolated. Only what lies at the slope gains detail.
+    refocused picture is interpolated. Only what lies at the slope gains detail; elsewhere
+    neighbouring fine pixels are reached by other views, which shows as a fine lattice in what is far out of focus.
 
     Parameters
     ----------
