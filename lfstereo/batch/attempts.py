@@ -13,7 +13,7 @@ from typing import TypeVar
 
 from lfstereo.batch.jobs import Job, Outcome
 from lfstereo.batch.notes import TIME_LIMIT, Note, mark_stopped, next_note, still_mine, write_note
-from lfstereo.batch.process import time_limit
+from lfstereo.batch.process import restore_malloc, time_limit
 from lfstereo.errors import LfstereoError
 from lfstereo.progress import Progress, StageClock
 
@@ -51,6 +51,7 @@ def attempt(job: JobT, body: Callable[[JobT, NotingClock], Outcome]) -> Outcome:
         Does it; :func:`check_not_superseded` guards what it makes visible.
     """
     with _ONE_AT_A_TIME:
+        restore_malloc()
         lost, note = next_note(job)
         if lost is not None and (refused := verdict_on_loss(job, lost)) is not None:
             job.note.unlink(missing_ok=True)

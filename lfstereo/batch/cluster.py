@@ -81,7 +81,7 @@ class ClusterCrew:
         self._client.close(timeout=5)
 
     def _workers(self) -> dict[str, Any]:
-        found: dict[str, Any] = self._client.scheduler_info(n_workers=-1)["workers"]
+        found: dict[str, Any] = self._client.scheduler_info(n_workers=-1).get("workers", {})
         return found
 
     def _count(self, resource: str | None) -> int:

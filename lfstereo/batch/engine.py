@@ -90,7 +90,7 @@ class Engine:
                 flight = queue.popleft()
                 try:
                     self._flying[step.executor.submit(step.work, flight.job)] = flight
-                except RuntimeError as error:
+                except Exception as error:  # a closed client has its own kind
                     queue.appendleft(flight)
                     self._stopped = f"no work can be handed out ({error})"
                     return

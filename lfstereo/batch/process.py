@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import faulthandler
 import multiprocessing
 import os
@@ -13,6 +14,9 @@ from pathlib import Path
 
 _GRACE_S = 5.0
 """Time for the watching thread to act before the hard stop, which also ends code that holds the interpreter."""
+_M_TRIM_THRESHOLD, _M_MMAP_THRESHOLD = -1, -3
+_LARGEST_ADAPTED = 32 << 20
+"""Where glibc's own adaption ends on 64-bit machines; bytes."""
 _THREAD_SETTINGS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 
@@ -35,6 +39,19 @@ def start_worker(threads: int) -> None:
             os._exit(1)
 
         threading.Thread(target=follow, daemon=True).start()
+
+
+def restore_malloc() -> None:
+    """Undo Dask's setting that makes every array of more than 128 KiB fresh memory, zeroed by the kernel.
+
+    A nanny sets ``MALLOC_TRIM_THRESHOLD_``, which also ends glibc's own adaption of the size from which memory is
+    mapped (mallopt(3)); decoding then spends as much time in the kernel as in computing. Does nothing elsewhere.
+    """
+    if "MALLOC_TRIM_THRESHOLD_" in os.environ:
+        with suppress(OSError, AttributeError):
+            mallopt = ctypes.CDLL(None).mallopt
+            mallopt(_M_MMAP_THRESHOLD, _LARGEST_ADAPTED)
+            mallopt(_M_TRIM_THRESHOLD, 2 * _LARGEST_ADAPTED)
 
 
 @contextmanager

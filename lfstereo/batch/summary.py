@@ -127,7 +127,7 @@ def _html_row(row: SummaryRow, names: Sequence[str]) -> str:
         cells = f"<td class='text'>{name}</td><td class='text' colspan='{4 + len(names)}'>{reason}</td>"
         return f"<tr class='failed'>{cells}</tr>"
     link = quote(row.name)
-    cells = f"<td class='text'><a href='{link}/overview.png'>{name}</a></td>"
+    cells = f"<td class='text'><a href='{link}/report.html'>{name}</a></td>"
     cells += f"<td class='text'><img loading='lazy' alt='' src='{link}/{THUMBNAIL}'></td>"
     cells += f"<td>{sum(found.seconds.values()):.1f}</td><td>{found.peak_gib:.2f}</td>"
     cells += "".join(f"<td>{_shown(found.figures.get(figure))}</td>" for figure in names)
