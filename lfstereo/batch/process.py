@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-_GRACE_S = 5.0
+_GRACE_S = 2.0
 """Time for the watching thread to act before the hard stop, which also ends code that holds the interpreter."""
 _M_TRIM_THRESHOLD, _M_MMAP_THRESHOLD = -1, -3
 _LARGEST_ADAPTED = 32 << 20
