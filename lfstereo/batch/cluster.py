@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import asyncio
 import secrets
 from collections.abc import Callable
-from concurrent.futures import Executor
+from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, ThreadPoolExecutor
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from lfstereo import __version__
 from lfstereo.batch.crew import PairWork, Step
@@ -20,8 +21,10 @@ GPU, CPU = "GPU", "CPU"
 
 Where a GPU is declared but no CPU, workers with a GPU may be given the other steps too.
 """
+T = TypeVar("T")
 _CONNECT_S = 20
 _FIRST_WORKER_S = 60
+_MOST_WAITERS = 1000
 _WAITING_PER_WORKER = 1
 """Jobs beyond the running ones that wait at the scheduler, so that no worker is idle for a round trip."""
 
@@ -89,9 +92,7 @@ class ClusterCrew:
         return sum(resource is None or resource in worker["resources"] for worker in self._workers().values())
 
     def _executor(self, resource: str | None) -> Executor:
-        wanted = {} if resource is None else {"resources": {resource: 1}}
-        executor: Executor = self._client.get_executor(pure=False, **wanted)
-        return executor
+        return TaskExecutor(self._client, {} if resource is None else {resource: 1})
 
     def _capacity(self, resource: str | None) -> Callable[[], int]:
         workers = self._count(resource)
@@ -123,6 +124,39 @@ class ClusterCrew:
                 raise InputError(
                     f"{worker}: found lfstereo {version}, expected {__version__} as here; install the same there"
                 )
+
+
+class TaskExecutor(Executor):
+    """The workers of a client that have some resources, as an executor.
+
+    ``Client.get_executor`` would do, but the future it gives never ends when a worker is lost while its answer is being
+    fetched; here a thread waits for each answer and passes on whatever comes.
+    """
+
+    def __init__(self, client: Any, resources: dict[str, int]) -> None:
+        self._client, self._resources = client, resources
+        self._waiters = ThreadPoolExecutor(_MOST_WAITERS, "answer")
+
+    def submit(self, fn: Callable[..., T], /, *args: Any, **kwargs: Any) -> Future[T]:
+        """Hand a call to a worker."""
+        task = self._client.submit(fn, *args, **kwargs, pure=False, resources=self._resources or None)
+        return self._waiters.submit(_answer, task)
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
+        """Take no more calls."""
+        self._waiters.shutdown(wait, cancel_futures=cancel_futures)
+
+
+def _answer(task: Any) -> Any:
+    """Wait for a task; a lost worker or scheduler ends it as it would end a local pool's future."""
+    from distributed.scheduler import KilledWorker
+
+    try:
+        return task.result()
+    except KilledWorker as error:
+        raise BrokenExecutor(str(error)) from error
+    except asyncio.CancelledError as error:
+        raise CancelledError(str(error)) from error
 
 
 def look_around(path: str) -> tuple[str, str]:
