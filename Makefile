@@ -1,17 +1,16 @@
 # Two commands do everything on a fresh machine with Python 3.11 or newer:
 #   make demo    simulate a pair of captures and turn it into depth
 #   make test    lint, types, tests, wheel
+# and make docs writes the API reference to build/docs
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 DEMO := demo
 
-.PHONY: demo test lint types tests wheel clean
+.PHONY: demo test lint types tests wheel docs clean
 
 demo: $(VENV)/.installed
-	$(BIN)/lfstereo simulate -o $(DEMO)/capture --force
-	$(BIN)/lfstereo run $(DEMO)/capture/left.LFR $(DEMO)/capture/right.LFR --rig $(DEMO)/capture/rig.toml \
-		--whites $(DEMO)/capture/whites --truth $(DEMO)/capture/truth -o $(DEMO)/result --force
+	$(BIN)/lfstereo demo -o $(DEMO) --force
 
 test: lint types tests wheel
 
@@ -27,6 +26,9 @@ tests: $(VENV)/.installed-dev
 
 wheel: $(VENV)/.installed-dev
 	$(BIN)/python -m build --no-isolation --outdir build/dist .
+
+docs: $(VENV)/.installed-dev
+	$(BIN)/pdoc --docformat numpy -o build/docs lfstereo
 
 $(VENV)/bin/python:
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "lfstereo needs Python 3.11 or newer; set PYTHON=")'

@@ -24,7 +24,7 @@ LAYERS = [
     ["simulate"],
     ["network"],
     ["training"],
-    ["pipeline", "results", "stack_pipeline", "stack_results", "batch", "viewer"],
+    ["pipeline", "results", "stack_pipeline", "stack_results", "batch", "viewer", "doctor"],
     ["cli", "__main__", "__init__"],
 ]
 RANK = {name: rank for rank, names in enumerate(LAYERS) for name in names}

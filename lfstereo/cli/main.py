@@ -45,19 +45,22 @@ COMMANDS: dict[str, tuple[str, str]] = {
         "lfstereo.cli.evaluate",
         "errors of every network and of classical methods on scenes of known disparity",
     ),
+    "demo": ("lfstereo.cli.demo", "simulate a pair of captures and turn it into depth"),
+    "doctor": ("lfstereo.cli.doctor", "check this installation and say what to do"),
+    "completion": ("lfstereo.cli.completion", "script that completes lfstereo's words in bash, zsh, fish or tcsh"),
 }
 """Command name -> module with ``configure(parser)`` and ``run(arguments) -> int``, and its help line."""
 
 
-def build_parser(argv: Sequence[str]) -> argparse.ArgumentParser:
-    """Build the parser; only the module of the command named in ``argv`` is imported."""
+def build_parser(argv: Sequence[str], every: bool = False) -> argparse.ArgumentParser:
+    """Build the parser; only the module of the command named in ``argv`` is imported, or with ``every`` all are."""
     parser = argparse.ArgumentParser(prog="lfstereo", description="Depth from pairs of Lytro light-field captures.")
     parser.add_argument("--version", action="version", version=f"lfstereo {__version__}")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
     wanted = next((word for word in argv if not word.startswith("-")), None)
     for name, (module, text) in COMMANDS.items():
         sub = commands.add_parser(name, help=text, description=text[0].upper() + text[1:] + ".")
-        if name == wanted:
+        if every or name == wanted:
             importlib.import_module(module).configure(sub)
     return parser
 
