@@ -72,9 +72,7 @@ def check_packages() -> list[Finding]:
 
         needed = importlib.metadata.requires("lfstereo") or []
     except importlib.metadata.PackageNotFoundError:
-        return [
-            Finding("packages", "wrong", "lfstereo is not installed", "run 'pip install .' beside pyproject.toml")
-        ]
+        return [Finding("packages", "wrong", "lfstereo is not installed", "run 'pip install .' beside pyproject.toml")]
     except ImportError as error:
         return [Finding("packages", "wrong", str(error), "run 'pip install packaging'")]
     findings = []
