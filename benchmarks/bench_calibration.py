@@ -1,8 +1,8 @@
 """Calibrate a simulated full-size rig from 12 photographs of a board, and compare it with the rig that was simulated.
 
-Run ``python benchmarks/bench_calibration.py`` (a quarter of an hour of one core: 26 captures are simulated), or give it the
-folder of a session simulated before: ``lfstereo simulate --boards 12 --distortion-k1 -0.1 -o SESSION``. The photographs
-are LFR files; nothing of the truth goes into the calibration but the size of the board's squares.
+Run ``python benchmarks/bench_calibration.py`` (a quarter of an hour of one core: 26 captures are simulated), or give it
+the folder of a session simulated before: ``lfstereo simulate --boards 12 --distortion-k1 -0.1 -o SESSION``. The
+photographs are LFR files; nothing of the truth goes into the calibration but the size of the board's squares.
 """
 
 from __future__ import annotations
