@@ -6,6 +6,9 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 DEMO := demo
+PACKAGES := container lenslet develop lightfield rig focus depth simulate network training batch viewer
+MODULES := conventions errors options pipeline stack_pipeline results \
+	lightfield.decoding lightfield.field lightfield.perspective lightfield.store
 
 .PHONY: demo test lint types tests wheel docs clean
 
@@ -28,7 +31,7 @@ wheel: $(VENV)/.installed-dev
 	$(BIN)/python -m build --no-isolation --outdir build/dist .
 
 docs: $(VENV)/.installed-dev
-	$(BIN)/pdoc --docformat numpy -o build/docs lfstereo
+	$(BIN)/pdoc --docformat numpy -o build/docs $(addprefix lfstereo.,$(PACKAGES) $(MODULES))
 
 $(VENV)/bin/python:
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "lfstereo needs Python 3.11 or newer; set PYTHON=")'

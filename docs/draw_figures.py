@@ -48,7 +48,7 @@ def views() -> str:
         '<rect x="320" y="45" width="250" height="174" fill="#eef2f6" stroke="#4878a8"/>',
         text(320, 38, "u = x, to the right"),
         text(304, 140, "v"),
-        text(330, 240, "v = y, downwards; (0, 0) is the middle of the first pixel"),
+        text(300, 240, "v = y, downwards; pixel (0, 0) is the top left one"),
         text(40, 262, "red: centre view (7, 7); pale: outside the micro-image"),
     ]
     return "".join(parts)
