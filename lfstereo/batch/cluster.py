@@ -155,7 +155,9 @@ def _answer(task: Any) -> Any:
         return task.result()
     except KilledWorker as error:
         raise BrokenExecutor(str(error)) from error
-    except asyncio.CancelledError as error:
+    except (Exception, asyncio.CancelledError) as error:
+        if task.status == "error":  # the call itself failed
+            raise
         raise CancelledError(str(error)) from error
 
 
