@@ -8,7 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from lfstereo.cli.main import COMMANDS, main
+from lfstereo.cli.demo import demo_commands
+from lfstereo.cli.main import COMMANDS, build_parser, main
 
 
 def test_demo_goes_from_nothing_to_depth(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -20,6 +21,13 @@ def test_demo_goes_from_nothing_to_depth(tmp_path: Path, capsys: pytest.CaptureF
     assert (out / "result" / "report.html").is_file()
     assert main(["demo", "-o", str(out), "--sensor", "small"]) == 3
     assert "exists already" in capsys.readouterr().err
+
+
+def test_demo_starts_commands_that_exist_at_every_size() -> None:
+    sizes = build_parser(["demo"]).parse_args(["demo"]).sensor, "small"
+    for sensor in sizes:
+        for words in demo_commands(Path("demo"), sensor, force=True):
+            assert build_parser(words).parse_args(words).command == words[0]
 
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish", "tcsh"])

@@ -15,7 +15,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument("-o", "--output", type=Path, default=Path("demo"), help="folder (default: %(default)s)")
     parser.add_argument(
-        "--sensor", choices=("full", "small"), default="full", help="full: 7728 x 5368 px; small: a fifth of that"
+        "--sensor", choices=("illum", "small"), default="illum", help="illum: 7728 x 5368 px; small: a fifth of that"
     )
     parser.add_argument("--force", action="store_true", help="replace the demo of an output folder that exists")
 
