@@ -45,3 +45,10 @@ def test_every_module_and_asset_is_inside(wheel: zipfile.ZipFile) -> None:
 def test_one_console_script(wheel: zipfile.ZipFile) -> None:
     scripts = wheel.read("lfstereo-0.1.0.dist-info/entry_points.txt").decode()
     assert scripts.split() == ["[console_scripts]", "lfstereo", "=", "lfstereo.cli.main:main"]
+
+
+def test_extras(wheel: zipfile.ZipFile) -> None:
+    metadata = wheel.read("lfstereo-0.1.0.dist-info/METADATA").decode()
+    extras = {line.split(": ")[1] for line in metadata.splitlines() if line.startswith("Provides-Extra: ")}
+    assert {"cluster", "view", "train"} <= extras
+    assert "Requires-Dist: distributed>=2024.8; extra == 'cluster'" in metadata
