@@ -17,8 +17,9 @@ from lfstereo.rig.rig import PlenopticCamera
 _WIDTH, _PANEL, _GAP = 1400, 440, 30
 _INK, _LEFT, _RIGHT, _BAD = (40, 40, 40), (180, 90, 20), (30, 110, 200), (40, 40, 200)
 """Blue-green-red."""
-_SIDES = ("left", "right")
-_CELLS = (12, 8)
+SIDES = ("left", "right")
+CELLS = (12, 8)
+"""Parts of the frame across and down, over which residuals are told."""
 _VIEW_FROM_DEG = (38.0, 24.0)
 """The drawing's turn about the vertical, then about the horizontal."""
 
@@ -47,7 +48,7 @@ def draw_report(solution: RigSolution, points: Float64) -> UInt8:
         _text(page, f"rejected: {', '.join(solution.rejected)}", (_GAP, 66), 0.6, _BAD)
     half = (_WIDTH - 3 * _GAP) // 2
     top = 70 + _GAP
-    for number, side in enumerate(_SIDES):
+    for number, side in enumerate(SIDES):
         x = _GAP + number * (half + _GAP)
         page[top : top + _PANEL, x : x + half] = _coverage(solution, side, half)
         below = top + _PANEL + _GAP
@@ -84,26 +85,39 @@ def _coverage(solution: RigSolution, side: str, width: int) -> UInt8:
     return panel
 
 
-def _residual_map(solution: RigSolution, side: str, width: int) -> UInt8:
-    """Draw the mean residual of each part of the frame as an arrow, over all shots and views."""
-    size = getattr(solution.rig, side).sensor_px
-    number = _SIDES.index(side)
+def residual_cells(solution: RigSolution, side: str) -> tuple[Float64, Float64]:
+    """Return how the residuals of all shots and views lie in parts of the frame.
+
+    Returns
+    -------
+    places, medians
+        ``(N, 2)`` middles of the cells that hold corners and their median residual, sensor px.
+    """
+    size = np.array(getattr(solution.rig, side).sensor_px, float)
     places, misses = [], []
-    for pair, residual in zip(solution.pairs, solution.adjustment.residuals[number::2], strict=True):
+    for pair, residual in zip(solution.pairs, solution.adjustment.residuals[SIDES.index(side) :: 2], strict=True):
         shot = getattr(pair, side)
         places.append(shot.place[shot.weight > 0])
         misses.append(residual[shot.weight > 0])
     place, miss = np.concatenate(places), np.concatenate(misses)
+    cell = np.clip((place / size * CELLS).astype(int), 0, np.array(CELLS) - 1)
+    used = np.unique(cell, axis=0)
+    medians = np.array([np.median(miss[np.all(cell == one, axis=1)], axis=0) for one in used])
+    return (used + 0.5) * size / CELLS, medians
+
+
+def _residual_map(solution: RigSolution, side: str, width: int) -> UInt8:
+    """Draw the mean residual of each part of the frame as an arrow."""
+    size = getattr(solution.rig, side).sensor_px
     longest = max(2 * solution.sigma_px, 1e-9)
     panel = _panel(f"{side}: mean residual, px; a whole cell = {longest:.2f} sensor px", width)
     scale, origin = _frame(panel, size)
-    cell = np.clip((place / size * _CELLS).astype(int), 0, np.array(_CELLS) - 1)
-    side_px = np.asarray(size) / _CELLS * scale
-    for column, row in np.unique(cell, axis=0):
-        inside = np.all(cell == (column, row), axis=1)
-        start = origin + (np.array([column, row]) + 0.5) * side_px
-        end = start + np.clip(np.median(miss[inside], axis=0) / longest, -1, 1) * side_px.min()
-        cv2.arrowedLine(panel, _point(start), _point(end), _RIGHT if number else _LEFT, 2, cv2.LINE_AA, 0, 0.3)
+    side_px = np.asarray(size) / CELLS * scale
+    colour = _RIGHT if side == "right" else _LEFT
+    for place, median in zip(*residual_cells(solution, side), strict=True):
+        start = origin + place * scale
+        end = start + np.clip(median / longest, -1, 1) * side_px.min()
+        cv2.arrowedLine(panel, _point(start), _point(end), colour, 2, cv2.LINE_AA, 0, 0.3)
         cv2.circle(panel, _point(start), 2, _INK, -1)
     return panel
 
@@ -130,7 +144,7 @@ def _in_space(solution: RigSolution, points: Float64, width: int) -> UInt8:
     """Draw boards and cameras in space, seen from behind the rig, above and to the left of it."""
     state, count = solution.adjustment.state, len(solution.pairs)
     worst = max(solution.errors, key=lambda error: error.rms_px).name
-    outline = _outline(points)
+    outline = board_outline(points)
     boards = [_seen(points_in_camera(state, outline, 0, n)) for n in range(count)]
     reach = 0.3 * max(points_in_camera(state, points, 0, n)[:, 2].max() for n in range(count))
     cameras = []
@@ -138,7 +152,7 @@ def _in_space(solution: RigSolution, points: Float64, width: int) -> UInt8:
         (np.zeros(3), np.eye(3), solution.rig.left),
         (solution.rig.right_centre_m, solution.rig.right_from_left, solution.rig.right),
     ):
-        cameras.append(_seen(centre + _frustum(camera, reach) @ turn))
+        cameras.append(_seen(centre + view_frustum(camera, reach) @ turn))
     everything = np.concatenate([*boards, *cameras])
     low, high = everything.min(axis=0), everything.max(axis=0)
     scale = float(min((width - 40) / (high - low)[0], (_PANEL - 60) / (high - low)[1]))
@@ -163,12 +177,13 @@ def _seen(places: Float64) -> Float64:
     return turned[:, :2]
 
 
-def _outline(points: Float64) -> Float64:
+def board_outline(points: Float64) -> Float64:
+    """Return the corners of the rectangle that holds a target's points, ``(4, 3)`` m in board axes."""
     (x, y, _), (right, bottom, _) = points.min(axis=0), points.max(axis=0)
     return np.array([[x, y, 0.0], [right, y, 0.0], [right, bottom, 0.0], [x, bottom, 0.0]])
 
 
-def _frustum(camera: PlenopticCamera, reach_m: float) -> Float64:
+def view_frustum(camera: PlenopticCamera, reach_m: float) -> Float64:
     """Return the pupil and the corners of the field of view at a depth, ``(5, 3)`` m in camera axes."""
     (width, height), (fx, fy), (cx, cy) = camera.sensor_px, camera.focal_px, camera.principal_px
     ends = [(0, 0), (width, 0), (width, height), (0, height)]
