@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
@@ -159,7 +159,7 @@ def match_pair(focused: FocusedPair, network: Network, clock: StageClock) -> Pai
         found = estimate_disparity(left.stack, right.stack, network, progress)
     valid = found.valid & common_field(found.disparity, left.seen, right.seen)
     return PairResult(
-        map=DisparityMap(disparity=found.disparity, valid=valid, all_in_focus=found.all_in_focus),
+        map=replace(found, valid=valid),
         left=left,
         right=right,
         geometry=focused.geometry,

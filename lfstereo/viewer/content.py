@@ -3,7 +3,8 @@
 Keys of a page's content
     ``title`` parts of the heading; ``lede`` the line below; ``made`` by what; ``size`` (V, U) of all pictures;
     ``turbo`` colours of disparity; ``pictures`` by name; ``slices`` near to far with the disparity in focus; ``views``
-    with their place (s, t) in the pupil; ``disparity`` codes and valid bits; ``doubt`` codes, 255 = no answer;
+    with their place (s, t) in the pupil; ``disparity`` codes and valid bits; ``overlays`` that say how sure it is, with
+    codes, 255 = no answer;
     ``slopes`` in focus of a single light field, px per view; ``geometry`` that turns px into metres; ``axis`` of the
     focus scale; ``slope_from_disparity`` px per view; ``record`` the tables of ``run.toml``; ``files`` beside the page;
     ``live`` what a server offers, or ``None``.
@@ -18,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from lfstereo.arrays import Float32, UInt8
+from lfstereo.arrays import Bool, Float32
 from lfstereo.depth.baselines import sgbm
 from lfstereo.focus.stack import FocalStack
 from lfstereo.lightfield.encoding import srgb8
@@ -29,8 +30,13 @@ from lfstereo.viewer.embedding import array_text, colour_table, jpeg_uri, mask_t
 PAGE_NAME = "report.html"
 _SHARP_QUALITY = 95
 _DISPARITY_CODES_PER_PX = 256
-_DOUBT_CODES_PER_PX = 16
+_OVERLAY_CODES_PER_PX = 16
+_OVERLAY_FULL_PX = 8
+"""Px from which on an overlay is drawn palest."""
 _NO_ANSWER = 255
+_UNCERTAINTY_LABEL = (
+    "How far off the network expects its own disparity to be. Learnt, like the disparity: small is no proof."
+)
 _DOUBT_LABEL = (
     "How far a second method is away: OpenCV's semi-global matching of the two centre views. Small where both agree, "
     "which is no proof. Darkest where the second method has no answer. A comparison, not a measured uncertainty."
@@ -80,11 +86,7 @@ def encode_result(result: PairResult) -> EncodedResult:
             "px_per_code": 1 / _DISPARITY_CODES_PER_PX,
             "valid": mask_text(found.valid),
         },
-        "doubt": {
-            "values": array_text(_second_opinion(result)),
-            "px_per_code": 1 / _DOUBT_CODES_PER_PX,
-            "label": _DOUBT_LABEL,
-        },
+        "overlays": _overlays(result),
         "slopes": None,
         "geometry": {
             "focal_px": geometry.focal_px,
@@ -168,10 +170,26 @@ def _slices(stack: FocalStack) -> list[dict[str, Any]]:
     ]
 
 
-def _second_opinion(result: PairResult) -> UInt8:
-    """Return the codes ``(V, U)`` of the distance between the map and semi-global matching, 255 = no answer."""
+def _overlays(result: PairResult) -> list[dict[str, Any]]:
+    """Return what tells how sure the disparity is: the network's own word, where it has one, and a second method."""
+    found, uncertainty = result.map, result.map.uncertainty_px
+    overlays = []
+    if uncertainty is not None:
+        overlays.append(_overlay("uncertainty", "Uncertainty", _UNCERTAINTY_LABEL, uncertainty, found.valid))
     views = result.left.centre_view, result.right.centre_view
     other = sgbm(*views, result.geometry.disparity_max_px)
-    away: Float32 = np.abs(result.map.disparity - other.disparity) * np.float32(_DOUBT_CODES_PER_PX)
-    codes: UInt8 = np.where(other.valid, np.clip(np.rint(away), 0, _NO_ANSWER - 1), _NO_ANSWER).astype(np.uint8)
-    return codes
+    away: Float32 = np.abs(found.disparity - other.disparity)
+    overlays.append(_overlay("doubt", "Second method", _DOUBT_LABEL, away, other.valid))
+    return overlays
+
+
+def _overlay(name: str, title: str, label: str, px: Float32, answered: Bool) -> dict[str, Any]:
+    codes = np.clip(np.rint(px * np.float32(_OVERLAY_CODES_PER_PX)), 0, _NO_ANSWER - 1)
+    return {
+        "id": name,
+        "name": title,
+        "label": label,
+        "values": array_text(np.where(answered, codes, _NO_ANSWER).astype(np.uint8)),
+        "px_per_code": 1 / _OVERLAY_CODES_PER_PX,
+        "full_px": _OVERLAY_FULL_PX,
+    }

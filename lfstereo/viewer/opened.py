@@ -106,7 +106,7 @@ def _open_field(item: Item, light_field: LightField) -> OpenItem:
         "slices": [],
         **encode_views(sample_views(light_field, gain)),
         "disparity": None,
-        "doubt": None,
+        "overlays": [],
         "slopes": None if slopes is None else _encoded(slopes),
         "geometry": None,
         "axis": {"near": near, "far": far, "unit": "px per view", "metric": False},

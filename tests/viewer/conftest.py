@@ -21,6 +21,8 @@ from lfstereo.rig.geometry import RectifiedCamera, RectifiedGeometry
 ROWS, COLUMNS = 96, 140
 NEAR_PX, FAR_PX = 60.0, 18.0
 """Disparity of the left and of the right half of the picture."""
+UNCERTAINTY_PX = (0.5, 3.25)
+"""Of the two halves."""
 FOCAL_PX, BASELINE_M, DOFFS_PX = 300.0, 0.1, 90.0
 SLOPE_FROM_DISPARITY = (0.02, -0.8)
 """Slopes of 0.4 and -0.44 px per view."""
@@ -72,7 +74,8 @@ def pair_result() -> PairResult:
     ]
     cameras = [RectifiedCamera(np.eye(3), (cx, (ROWS - 1) / 2)) for cx in (70.0, 70.0 + DOFFS_PX)]
     geometry = RectifiedGeometry(*cameras, FOCAL_PX, BASELINE_M, (ROWS, COLUMNS), 0.3, 0.3, 90.0)
-    return PairResult(DisparityMap(map_px, seen, sharp), *sides, geometry, "0" * 64)
+    unsure = np.where(map_px == NEAR_PX, *UNCERTAINTY_PX).astype(np.float32)
+    return PairResult(DisparityMap(map_px, seen, sharp, unsure), *sides, geometry, "0" * 64)
 
 
 @pytest.fixture(scope="session")

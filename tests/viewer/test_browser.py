@@ -17,11 +17,11 @@ from lfstereo.conventions import depth_from_disparity
 from lfstereo.viewer.server import PageServer
 from lfstereo.viewer.shelf import find_items
 
-from .conftest import BASELINE_M, COLUMNS, DOFFS_PX, FAR_PX, FOCAL_PX, NEAR_PX, ROWS
+from .conftest import BASELINE_M, COLUMNS, DOFFS_PX, FAR_PX, FOCAL_PX, NEAR_PX, ROWS, UNCERTAINTY_PX
 
 BROWSER = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 DRIVER = shutil.which("chromedriver")
-WAIT_S = 60.0
+WAIT_S = 240.0
 HALF_SLICE_PX = 3.01
 LEFT, RIGHT = (35, 48), (105, 48)
 """A pixel of the near half and one of the far half."""
@@ -121,6 +121,11 @@ class Page:
         self.run("document.getElementById('stage').focus()")
         for kind in ("keyDown", "keyUp"):
             self.driver.execute_cdp_cmd("Input.dispatchKeyEvent", {"type": kind, "key": name, "text": name[1:] and ""})
+
+    def choose(self, words: str) -> None:
+        """Press the button of a choice in the panel."""
+        script = "[...document.querySelectorAll('.choice button')].find(b => b.innerText === arguments[0]).click()"
+        self.run(script, words)
 
     def slide(self, name: str, value: float) -> None:
         script = """
@@ -227,13 +232,17 @@ def test_keys_read_values_too(result: Page) -> None:
 def test_overlays(result: Page) -> None:
     result.mode("depth")
     shown = [result.until(lambda: result.colours("picture") >= 3 and result.picture())]
-    for change in ("doubt",):
-        result.run("document.getElementById(arguments[0]).click()", change)
+    for name, words in (("Second method", "no proof"), ("Uncertainty", "expects its own disparity")):
+        result.choose(name)
         shown.append(result.picture())
+        assert words in result.text("overlay")
     result.key("+")
     shown.append(result.picture())
-    assert len(set(shown)) == 3
-    assert "no proof" in result.text("panel")
+    assert len(set(shown)) == 4
+    result.mouse("mouseMoved", *RIGHT)
+    result.until(lambda: result.text("reading-uncertainty") == f"{UNCERTAINTY_PX[1]:.2f} px")
+    result.choose("Disparity")
+    assert result.text("overlay") == ""
 
 
 def test_perspective_follows_a_drag_and_a_finger(result: Page) -> None:
@@ -276,7 +285,7 @@ def test_points_are_drawn_and_turn(page: Page, address: str, query: str, name: s
     larger = page.picture("space-canvas")
     assert len({first, turned, larger}) == 3
     if name == "WebGL2":
-        page.run("[...document.querySelectorAll('.choice button')].find(b => b.innerText === 'Surface').click()")
+        page.choose("Surface")
         assert page.picture("space-canvas") != larger
         assert page.colours("space-canvas") > 200
     assert page.complaints() == []

@@ -5,17 +5,20 @@ from __future__ import annotations
 import base64
 import hashlib
 import re
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from lfstereo.errors import ContainerError
 from lfstereo.lightfield.encoding import srgb8
+from lfstereo.viewer.content import encode_result
 from lfstereo.viewer.embedding import array_text, jpeg_uri, mask_text, picture_from_uri
 from lfstereo.viewer.template import fill_page, read_content
 
-from .conftest import DOFFS_PX, FAR_PX, NEAR_PX, disparity, texture
+from .conftest import DOFFS_PX, FAR_PX, NEAR_PX, UNCERTAINTY_PX, disparity, pair_result, texture
 
 SIZE_LIMIT_BYTES = 25 * 2**20
 JPEG_MEAN_CODES = 4.0
@@ -41,15 +44,30 @@ def test_holds_what_the_run_computed(result_folder: Path) -> None:
     assert np.abs(sharp.astype(float) - srgb8(texture())).mean() < JPEG_MEAN_CODES
 
 
+def overlay(content: dict[str, Any], name: str) -> dict[str, Any]:
+    (found,) = (one for one in content["overlays"] if one["id"] == name)
+    return dict(found)
+
+
 def test_doubt_is_the_distance_to_the_second_method(result_folder: Path) -> None:
     """The right view is the left one moved by 20 px everywhere: near the far half's 18 px, far from the near's 60."""
-    doubt = read_content(result_folder / "report.html")["doubt"]
+    doubt = overlay(read_content(result_folder / "report.html"), "doubt")
     codes = np.frombuffer(base64.b64decode(doubt["values"]), np.uint8).reshape(disparity().shape)
     answered = codes[:, 100:] != 255
     assert answered.mean() > 0.3
     assert np.median(codes[:, 100:][answered]) * doubt["px_per_code"] == pytest.approx(20.0 - FAR_PX, abs=0.3)
     near = codes[:, 30:60]
     assert (near[near != 255] * doubt["px_per_code"] > 0.3 * (NEAR_PX - 20.0)).all()
+
+
+def test_uncertainty_is_shown_where_the_map_has_it(result_folder: Path) -> None:
+    told = overlay(read_content(result_folder / "report.html"), "uncertainty")
+    codes = np.frombuffer(base64.b64decode(told["values"]), np.uint8).reshape(disparity().shape)
+    assert (codes[:, :4] == 255).all(), "no answer where one camera alone sees"
+    assert codes[0, 10] * told["px_per_code"] == UNCERTAINTY_PX[0]
+    assert codes[0, -1] * told["px_per_code"] == UNCERTAINTY_PX[1]
+    silent = replace(pair_result(), map=replace(pair_result().map, uncertainty_px=None))
+    assert [one["id"] for one in encode_result(silent).parts["overlays"]] == ["doubt"]
 
 
 def test_reaches_nothing_outside(result_folder: Path) -> None:

@@ -2,6 +2,10 @@
 
 const byId = (id) => document.getElementById(id);
 
+// What the page shows, as it was written into it.
+const CONTENT = JSON.parse(byId("content").textContent);
+const RECORD = CONTENT.record;
+
 function element(tag, attributes = {}, ...children) {
   const made = document.createElement(tag);
   for (const [name, value] of Object.entries(attributes)) {
@@ -70,4 +74,10 @@ function oncePerFrame(work) {
     waiting = true;
     requestAnimationFrame(() => { waiting = false; work(); });
   };
+}
+
+// Rows of the rotation of an orbit: a turn about the vertical, then a nod.
+function orbitRows(orbit) {
+  const cy = Math.cos(orbit.yaw), sy = Math.sin(orbit.yaw), cp = Math.cos(orbit.pitch), sp = Math.sin(orbit.pitch);
+  return [[cy, 0, sy], [sp * sy, cp, -sp * cy], [-cp * sy, sp, cp * cy]];
 }

@@ -1,13 +1,12 @@
-// What the page shows, as it was written into it, and the arrays that are computed from it.
+// The arrays in the content of a result or light field, and what is computed from them.
 
-const CONTENT = JSON.parse(byId("content").textContent);
 const [HEIGHT, WIDTH] = CONTENT.size;
 const GEOMETRY = CONTENT.geometry;
 const TURBO = bytesOf(CONTENT.turbo);
 
 const DISPARITY = CONTENT.disparity && new Uint16Array(bytesOf(CONTENT.disparity.values).buffer);
 const VALID = CONTENT.disparity && unpacked(bytesOf(CONTENT.disparity.valid), WIDTH * HEIGHT);
-const DOUBT = CONTENT.doubt && bytesOf(CONTENT.doubt.values);
+const OVERLAYS = CONTENT.overlays.map((overlay) => ({ ...overlay, codes: bytesOf(overlay.values) }));
 
 function unpacked(bytes, count) {
   const bits = new Uint8Array(count);
@@ -34,11 +33,10 @@ function metresOf(disparity) {
   return shift > 0 ? (GEOMETRY.focal_px * GEOMETRY.baseline_m) / shift : null;
 }
 
-// Difference from the second method in px, or null where that has no answer.
-function doubtAt(x, y) {
-  if (!DOUBT) return null;
-  const code = DOUBT[y * WIDTH + x];
-  return code === 255 ? null : code * CONTENT.doubt.px_per_code;
+// Px that an overlay tells of a pixel, or null where it has no answer.
+function overlayAt(overlay, x, y) {
+  const code = overlay.codes[y * WIDTH + x];
+  return code === 255 ? null : code * overlay.px_per_code;
 }
 
 // Pictures are decoded when first asked for and kept.

@@ -57,10 +57,9 @@ function startLive(served) {
 }
 
 function offerItems(served) {
-  const chooser = byId("chooser");
-  chooser.append(...served.items.map((name, k) => element("option", { value: k, textContent: name })));
+  const chooser = element("select", { id: "chooser" }, ...served.items.map((name, k) => element("option", { value: k, textContent: name })));
   chooser.value = served.item;
-  chooser.parentElement.hidden = false;
+  byId("theme").before(element("label", { className: "chooser" }, element("span", { className: "label", textContent: "Capture" }), chooser));
   chooser.addEventListener("change", () => {
     chooser.disabled = true;
     location.href = `${served.root}?item=${chooser.value}${location.hash}`;

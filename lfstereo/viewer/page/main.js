@@ -41,13 +41,6 @@ function buildModes() {
   });
 }
 
-function buildTitle() {
-  const title = byId("title");
-  CONTENT.title.forEach((part, k) => title.append(...(k ? [element("span", { textContent: " / " })] : []), part));
-  byId("lede").textContent = CONTENT.lede;
-  byId("made").textContent = CONTENT.made;
-}
-
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
 
 document.addEventListener("keydown", (event) => {
@@ -62,7 +55,6 @@ document.addEventListener("keydown", (event) => {
   else if (event.key === "+" || event.key === "=") nearer(1.25);
   else if (event.key === "-" || event.key === "−") nearer(0.8);
   else if (event.key === "s" || event.key === "S") savePicture();
-  else if (event.key === "t" || event.key === "T") switchTheme();
   else return;
   event.preventDefault();
 });
@@ -86,28 +78,11 @@ function savePicture() {
   });
 }
 
-function switchTheme() {
-  const root = document.documentElement;
-  const dark = root.dataset.theme ? root.dataset.theme === "dark" : matchMedia("(prefers-color-scheme: dark)").matches;
-  root.dataset.theme = dark ? "light" : "dark";
-  try { localStorage.setItem("lfstereo-theme", root.dataset.theme); } catch { /* no storage for this page: lasts until it closes */ }
-}
-
-function recallTheme() {
-  try {
-    const kept = localStorage.getItem("lfstereo-theme");
-    if (kept === "dark" || kept === "light") document.documentElement.dataset.theme = kept;
-  } catch { /* as above */ }
-}
-
-recallTheme();
-buildTitle();
 buildModes();
 buildScale();
 buildReadout();
 buildSheets();
 focusInput.hidden = true;
-byId("theme").addEventListener("click", switchTheme);
 byId("zoom-in").addEventListener("click", () => nearer(1.5));
 byId("zoom-out").addEventListener("click", () => nearer(1 / 1.5));
 byId("save").addEventListener("click", savePicture);

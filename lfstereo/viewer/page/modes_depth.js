@@ -1,14 +1,12 @@
 // Modes that show disparity: the map with its overlays, and the swipe between two pictures.
 
-const DOUBT_FULL_PX = 8;
-
 const depthMode = {
   id: "depth",
   label: "Disparity",
   available: Boolean(DISPARITY),
   opacity: 1,
   hide: true,
-  doubt: false,
+  overlay: null,
   layers: {},
   // Colours are computed once per setting and kept as canvases.
   colours(hide) {
@@ -20,10 +18,11 @@ const depthMode = {
     });
     return this.layers[name];
   },
-  doubts() {
-    this.layers.doubt ||= painted((data, i, k) => {
-      const share = DOUBT[i] === 255 ? 0 : clamp((DOUBT[i] * CONTENT.doubt.px_per_code) / DOUBT_FULL_PX, 0, 1);
-      if (DOUBT[i] === 255) data[k + 3] = 150;
+  // What an overlay tells, over the dimmed image: clear at 0, amber, then pale from its full scale on.
+  told(overlay) {
+    this.layers[overlay.id] ||= painted((data, i, k) => {
+      const code = overlay.codes[i], share = clamp((code * overlay.px_per_code) / overlay.full_px, 0, 1);
+      if (code === 255) data[k + 3] = 150;
       else {
         data[k] = 255;
         data[k + 1] = 150 + 90 * share;
@@ -31,45 +30,46 @@ const depthMode = {
         data[k + 3] = 255 * Math.min(1, 1.5 * share);
       }
     });
-    return this.layers.doubt;
+    return this.layers[overlay.id];
   },
   draw(context) {
-    context.filter = this.doubt ? "grayscale(1) brightness(.62)" : "none";
+    context.filter = this.overlay ? "grayscale(1) brightness(.62)" : "none";
     drawPicture(context, CONTENT.pictures.sharp);
     context.filter = "none";
-    context.globalAlpha = this.doubt ? 1 : this.opacity;
-    context.drawImage(this.doubt ? this.doubts() : this.colours(this.hide), 0, 0);
+    context.globalAlpha = this.overlay ? 1 : this.opacity;
+    context.drawImage(this.overlay ? this.told(this.overlay) : this.colours(this.hide), 0, 0);
     context.globalAlpha = 1;
   },
   panel() {
-    const ofMap = [
+    const ofMap = element("div", {},
       rangeControl("Disparity over image", { min: 0, max: 1, step: 0.01, value: this.opacity },
         (value) => `${Math.round(100 * value)} %`, (value) => { this.opacity = value; redraw(); }),
-      switchControl("Hide what one camera alone sees", this.hide, (on) => { this.hide = on; redraw(); }),
-    ];
-    const controls = [...ofMap];
-    const fit = () => {
-      legend.hidden = !this.doubt;
-      for (const control of ofMap) control.hidden = this.doubt;
+      switchControl("Hide what one camera alone sees", this.hide, (on) => { this.hide = on; redraw(); }));
+    const ofOverlay = element("div", { id: "overlay" });
+    const show = (id) => {
+      this.overlay = OVERLAYS.find((overlay) => overlay.id === id) || null;
+      ofMap.hidden = Boolean(this.overlay);
+      ofOverlay.replaceChildren(...(this.overlay ? legendOf(this.overlay) : []));
+      redraw();
     };
-    if (DOUBT) controls.push(switchControl("Show doubt instead", this.doubt, (on) => { this.doubt = on; fit(); redraw(); }, "doubt"));
-    const legend = element("div", { className: "actions" });
-    if (DOUBT) {
-      const ramp = "linear-gradient(90deg, rgb(80 80 80), rgb(255 190 60) 55%, rgb(255 240 220))";
-      legend.append(
-        element("div", { className: "legend", style: `background:${ramp}` }),
-        element("div", {}, element("span", { textContent: "0" }), element("span", { textContent: `≥ ${DOUBT_FULL_PX} px` })),
-        element("p", { className: "note", textContent: CONTENT.doubt.label }));
-    }
-    fit();
+    const names = [["", "Disparity"], ...OVERLAYS.map((overlay) => [overlay.id, overlay.name])];
+    const choice = OVERLAYS.length ? [choiceControl("Show", names, this.overlay ? this.overlay.id : "", show)] : [];
+    show(this.overlay ? this.overlay.id : "");
     return [
       ...heading("Disparity", "How far each point lies apart in the two views, warm for near. The scale below the picture gives the colours in metres and px."),
-      ...controls, legend,
+      ...choice, ofMap, ofOverlay,
     ];
   },
   arrow(dx, dy) { moveCursor(dx, dy); },
   fileName: "disparity",
 };
+
+function legendOf(overlay) {
+  return [element("div", { className: "actions" },
+    element("div", { className: "legend doubtful" }),
+    element("div", {}, element("span", { textContent: "0" }), element("span", { textContent: `≥ ${overlay.full_px} px` })),
+    element("p", { className: "note", textContent: overlay.label }))];
+}
 
 function painted(paint) {
   const canvas = offscreen(WIDTH, HEIGHT), context = canvas.getContext("2d");

@@ -68,7 +68,9 @@ const READINGS = [
   { name: "Disparity", of: (at) => disparityAt(at.x, at.y).toFixed(2), unit: "px", shown: Boolean(DISPARITY), id: "disparity" },
   { name: "Depth", of: (at) => metresText(metresOf(disparityAt(at.x, at.y))), unit: "m", shown: Boolean(DISPARITY), id: "depth" },
   { name: "Slope", of: (at) => slopeAt(at.x, at.y).toFixed(3).replace("-", "−"), unit: "px per view", shown: Boolean(SLOPES), id: "slope" },
-  { name: "Doubt", of: (at) => { const d = doubtAt(at.x, at.y); return d === null ? "—" : d.toFixed(2); }, unit: "px", shown: Boolean(DOUBT), id: "doubt", optional: true },
+  ...OVERLAYS.map((overlay) => ({
+    name: overlay.name, of: (at) => overlayAt(overlay, at.x, at.y)?.toFixed(2) ?? "—", unit: "px", id: overlay.id, optional: true,
+  })),
   { name: "Seen by", of: (at) => (isValid(at.x, at.y) ? "both" : "one"), unit: "", shown: Boolean(DISPARITY), id: "seen", optional: true },
 ].filter((reading) => reading.shown !== false);
 

@@ -1,18 +1,5 @@
 // Below the stage: quality figures, settings and files.
 
-const RECORD = CONTENT.record;
-
-function sheet(title, about, ...content) {
-  return element("section", { className: "sheet" },
-    element("h2", {}, title, ...(about ? [element("small", { textContent: about })] : [])),
-    element("div", {}, ...content));
-}
-
-function figure(name, value, unit = "") {
-  return element("div", {}, element("dt", { textContent: name }),
-    element("dd", {}, value, ...(unit ? [" ", element("small", { textContent: unit })] : [])));
-}
-
 const total = (table) => Object.values(table).reduce((sum, value) => sum + value, 0);
 const shortSpan = ([low, high], digits) => `${low.toFixed(digits)} – ${high.toFixed(digits)}`;
 
@@ -55,16 +42,6 @@ function histogram() {
     element("span", { textContent: ends[0] }), element("span", { textContent: ends[1] })));
 }
 
-function table(head, rows) {
-  const cell = (tag, content, k) => {
-    const amount = head[k].amount ? "amount" : "";
-    return element(tag, { className: amount }, content);
-  };
-  return element("div", { className: "scroll" }, element("table", {},
-    element("thead", {}, element("tr", {}, ...head.map((column, k) => cell("th", column.name, k)))),
-    element("tbody", {}, ...rows.map((row) => element("tr", { className: row.own ? "own" : "" }, ...row.cells.map((content, k) => cell("td", content, k)))))));
-}
-
 function errorsSheet() {
   const head = ["", "Mean error", "off > 1 px", "> 2 px", "> 4 px", "Median of depth"].map((name, k) => ({ name, amount: k > 0 }));
   const rows = Object.entries(RECORD.error).map(([name, e], k) => ({
@@ -85,34 +62,11 @@ function timesSheet() {
   return sheet("Work", "Wall time and largest memory of each stage.", made);
 }
 
-function pairs(title, values) {
-  const rows = Object.entries(values).map(([name, value]) => element("tr", {},
-    element("td", { textContent: name }), element("td", {}, valueText(value))));
-  return element("div", {}, element("h3", { textContent: title }), element("table", {}, element("tbody", {}, ...rows)));
-}
-
-function valueText(value) {
-  if (Array.isArray(value)) {
-    return value.length > 4 ? `${valueText(value[0])} … ${valueText(value[value.length - 1])} (${value.length})` : value.map(valueText).join(", ");
-  }
-  if (typeof value === "number") return Number.isInteger(value) ? String(value) : String(Number(value.toPrecision(6)));
-  if (typeof value === "string" && /^[0-9a-f]{64}$/.test(value)) return element("code", { title: value, textContent: `${value.slice(0, 12)}…` });
-  return String(value);
-}
-
 function settingsSheet() {
   const titles = { run: "Options", inputs: "Inputs", geometry: "Rectified geometry", field: "Light field", versions: "Versions", sha256: "SHA-256" };
   const groups = Object.entries(titles).filter(([name]) => RECORD[name]).map(([name, title]) => pairs(title, RECORD[name]));
   const about = DISPARITY ? "All that is needed to make this result again; run.toml holds it in full." : "";
   return sheet("Settings", about, element("div", { className: "tables" }, ...groups));
-}
-
-function filesSheet() {
-  const head = [{ name: "File" }, { name: "Holds" }, { name: "Size", amount: true }];
-  const rows = CONTENT.files.map((file) => ({
-    cells: [file.href === null ? file.name : element("a", { href: file.href, textContent: file.name }), file.about, file.bytes === null ? "" : sizeText(file.bytes)],
-  }));
-  return sheet("Files", "Beside this page.", table(head, rows));
 }
 
 function buildSheets() {

@@ -69,9 +69,3 @@ function buildTriangles(scene) {
   }
   return new Uint32Array(corners);
 }
-
-// Camera of the orbit: rows of the rotation, and how far back it stands. Focal length as the picture's at distance 1.
-function orbitRows(orbit) {
-  const cy = Math.cos(orbit.yaw), sy = Math.sin(orbit.yaw), cp = Math.cos(orbit.pitch), sp = Math.sin(orbit.pitch);
-  return [[cy, 0, sy], [sp * sy, cp, -sp * cy], [-cp * sy, sp, cp * cy]];
-}
