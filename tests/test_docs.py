@@ -41,6 +41,10 @@ def test_every_page_is_in_the_list() -> None:
     assert [page.name for page in PAGES if page.name != "README.md" and f"({page.name})" not in listed] == []
 
 
+def test_one_page_tells_every_command() -> None:
+    assert {words[1] for page, words in LINES if page == "commands.md"} == set(COMMANDS)
+
+
 def test_figures_are_what_the_script_draws(tmp_path: Path) -> None:
     subprocess.run([sys.executable, str(DOCS / "draw_figures.py"), "-o", str(tmp_path)], check=True)
     drawn = {path.name: path.read_text("utf-8") for path in tmp_path.iterdir()}

@@ -22,8 +22,22 @@ SHELL_LINES = [
 PROGRAM_LINES = [line for line in SHELL_LINES if line.startswith("lfstereo ")]
 
 
-def test_names_every_command() -> None:
-    assert {shlex.split(line)[1] for line in PROGRAM_LINES} == set(COMMANDS)
+def test_tells_the_three_jobs() -> None:
+    assert {"run", "calibrate", "batch", "demo", "doctor"} <= {shlex.split(line)[1] for line in PROGRAM_LINES}
+
+
+def test_measuring_commands_exist() -> None:
+    """Every figure names the command that gives it."""
+    rows = [line for line in README.splitlines() if line.startswith("|") and "---" not in line]
+    told = [row.split("|")[-2] for row in rows if not row.startswith("| what |")]
+    assert len(told) > 10
+    for words in re.findall(r"`([^`]+)`", " ".join(told)):
+        program, named, *_ = words.split()
+        assert program in ("make", "python", "lfstereo"), words
+        if program == "python":
+            assert (ROOT / named).is_file(), words
+        if program == "lfstereo":
+            assert named in COMMANDS, words
 
 
 @pytest.mark.parametrize("line", PROGRAM_LINES)
