@@ -22,6 +22,7 @@ from lfstereo.rig.session import see_targets
 from lfstereo.rig.shots import pair_shots
 from lfstereo.rig.target import Target, write_target
 from lfstereo.rig.target_print import lay_out
+from lfstereo.viewer.template import read_content
 
 TARGET = Target("checkerboard", (7, 6), 0.025)
 LEFT = PlenopticCamera("L", (240, 180), (420.0, 420.0), (121.0, 88.0), 0.85, 8e-4)
@@ -103,6 +104,14 @@ def test_photographs_become_a_rig_and_a_report(
     assert (rig.left.zoom_step, rig.right.focus_step) == (105, -6)
     picture = cv2.imread(str(tmp_path / "rig.png"))
     assert picture.shape[1] == 1400 and picture.std() > 10
+    content = read_content(tmp_path / "rig.html")
+    assert content["title"] == ["L", "R"]
+    assert [shot["name"] for shot in content["shots"]] == [f"{n:02d}" for n in range(6)]
+    assert content["rig"]["baseline_m"] == pytest.approx(rig.baseline_m)
+    distances = [shot["distance_m"] for shot in content["shots"]]
+    assert distances == pytest.approx([0.8, 0.95, 0.7, 1.05, 0.75, 0.9], rel=0.05)
+    assert content["shots"][0]["tilt_deg"] == pytest.approx(math.degrees(0.4), abs=2)
+    assert [file["name"] for file in content["files"]] == ["rig.toml", "rig.png"]
     assert main(words(photographs, output)) == 3
     assert "exists already" in capsys.readouterr().err
 

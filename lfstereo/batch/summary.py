@@ -6,14 +6,17 @@ import csv
 import io
 from collections.abc import Sequence
 from dataclasses import dataclass
-from html import escape
 from pathlib import Path
+from typing import Any
 from urllib.parse import quote
 
+from lfstereo import __version__
 from lfstereo.batch.figures import THUMBNAIL
 from lfstereo.batch.pairing import Leftover
 from lfstereo.batch.record import Entry
 from lfstereo.outputs import atomic_file
+from lfstereo.viewer.content import PAGE_NAME
+from lfstereo.viewer.template import fill_page
 
 CSV_NAME, HTML_NAME = "summary.csv", "summary.html"
 _ALWAYS = ("valid_share", "view_difference", "disparity_low_px", "disparity_high_px", "depth_low_m", "depth_high_m")
@@ -31,12 +34,6 @@ _HEADS = {
     "bad_4_percent": "> 4 px, %",
     "median_depth_error": "median depth error",
 }
-_STYLE = """
-body { font: 14px/1.4 system-ui, sans-serif; margin: 2em; color: #222 }
-table { border-collapse: collapse } td, th { padding: .3em .8em; border-bottom: 1px solid #ddd; text-align: right }
-th { position: sticky; top: 0; background: #fff } td.text, th.text { text-align: left }
-tr.failed td { background: #fdecea } img { display: block; height: 90px }
-"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +54,8 @@ def write_summary(output: Path, rows: Sequence[SummaryRow], leftovers: Sequence[
     OutputError
         If they cannot be written.
     """
-    for name, text in ((CSV_NAME, _csv(rows)), (HTML_NAME, _html(rows, leftovers))):
+    page = fill_page(page_content(output, rows, leftovers), "batch")
+    for name, text in ((CSV_NAME, _csv(rows)), (HTML_NAME, page)):
         with atomic_file(output / name, force=True) as scratch:
             scratch.write_text(text, "utf-8")
 
@@ -94,46 +92,44 @@ def _csv(rows: Sequence[SummaryRow]) -> str:
     return text.getvalue()
 
 
-def _html(rows: Sequence[SummaryRow], leftovers: Sequence[Leftover]) -> str:
+def page_content(output: Path, rows: Sequence[SummaryRow], leftovers: Sequence[Leftover]) -> dict[str, Any]:
+    """Return what the page shows.
+
+    Keys
+    ----
+    ``title``, ``lede``, ``made`` as on every page; ``columns`` of figures with their heads; ``pairs`` in order, with
+    ``state``, where their page and small picture lie, figures and warnings; ``left_out``; ``files`` beside the page.
+    """
     names = _figure_names(rows)
     counts = {state: sum(row.state == state for row in rows) for state in ("done", "failed", "not done")}
-    heads = ["seconds", "peak GiB", *(_HEADS[name] for name in names)]
-    lines = [
-        "<!doctype html><meta charset='utf-8'><title>lfstereo batch</title>",
-        f"<style>{_STYLE}</style><h1>lfstereo batch</h1>",
-        f"<p>{', '.join(f'{count} {state}' for state, count in counts.items())}</p>",
-        "<table><tr><th class='text'>pair</th><th class='text'>all in focus, disparity</th>",
-        "".join(f"<th>{escape(head)}</th>" for head in heads) + "<th class='text'>warnings</th></tr>",
-        *(_html_row(row, names) for row in rows),
-        "</table>",
-    ]
-    if leftovers:
-        lines.append("<h2>Captures in no pair</h2><table>")
-        for item in leftovers:
-            places = ", ".join(capture.place.as_posix() for capture in item.captures)
-            lines.append(
-                f"<tr><td class='text'>{item.kind}</td><td class='text'>{escape(places)}</td>"
-                f"<td class='text'>{escape(item.reason)}</td></tr>"
-            )
-        lines.append("</table>")
-    return "\n".join(lines) + "\n"
+    return {
+        "title": [output.resolve().name],
+        "lede": ", ".join(f"{count} {state}" for state, count in counts.items()) + ".",
+        "made": f"lfstereo {__version__}",
+        "columns": [[name, _HEADS[name]] for name in names],
+        "pairs": [_page_row(row, names) for row in rows],
+        "left_out": [
+            [item.kind, ", ".join(capture.place.as_posix() for capture in item.captures), item.reason]
+            for item in leftovers
+        ],
+        "files": [{"name": CSV_NAME, "href": CSV_NAME, "about": "the same as a table", "bytes": None}],
+    }
 
 
-def _html_row(row: SummaryRow, names: Sequence[str]) -> str:
-    name = escape(row.name)
+def _page_row(row: SummaryRow, names: Sequence[str]) -> dict[str, Any]:
     found = row.entry.outcome if row.entry else None
-    if found is None or row.state != "done":
-        reason = escape(found.reason) if found and row.state == "failed" else row.state
-        cells = f"<td class='text'>{name}</td><td class='text' colspan='{4 + len(names)}'>{reason}</td>"
-        return f"<tr class='failed'>{cells}</tr>"
-    link = quote(row.name)
-    cells = f"<td class='text'><a href='{link}/report.html'>{name}</a></td>"
-    cells += f"<td class='text'><img loading='lazy' alt='' src='{link}/{THUMBNAIL}'></td>"
-    cells += f"<td>{sum(found.seconds.values()):.1f}</td><td>{found.peak_gib:.2f}</td>"
-    cells += "".join(f"<td>{_shown(found.figures.get(figure))}</td>" for figure in names)
-    cells += f"<td class='text'>{escape('; '.join(found.warnings))}</td>"
-    return f"<tr>{cells}</tr>"
-
-
-def _shown(value: float | None) -> str:
-    return "" if value is None else f"{value:.4g}"
+    if found is None or row.state == "not done":
+        return {"name": row.name, "state": row.state}
+    if row.state == "failed":
+        return {"name": row.name, "state": row.state, "reason": found.reason}
+    folder = quote(row.name)
+    return {
+        "name": row.name,
+        "state": row.state,
+        "page": f"{folder}/{PAGE_NAME}",
+        "picture": f"{folder}/{THUMBNAIL}",
+        "seconds": sum(found.seconds.values()),
+        "peak_gib": found.peak_gib,
+        "figures": [found.figures.get(name) for name in names],
+        "warnings": list(found.warnings),
+    }

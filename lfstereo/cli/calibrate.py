@@ -41,7 +41,10 @@ def configure(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--whites", type=Path, help="folder with the cameras' white images; needed for raw captures")
     parser.add_argument(
-        "-o", "--output", type=Path, help="rig file to write (.toml), a report beside it; not needed with --refine"
+        "-o",
+        "--output",
+        type=Path,
+        help="rig file to write (.toml), a page and a picture of how good it is beside it; not needed with --refine",
     )
     parser.add_argument("--drop", nargs="+", default=[], metavar="NAME", help="shots to leave out, by name")
     parser.add_argument(
@@ -68,6 +71,7 @@ def _calibrate(arguments: argparse.Namespace) -> int:
     from lfstereo.rig.session import see_targets
     from lfstereo.rig.shots import pair_shots
     from lfstereo.rig.target import read_target
+    from lfstereo.viewer.calibration import write_calibration_page
 
     if arguments.target is None or arguments.output is None:
         raise ConfigError("calibrate: found no --target or no -o, expected both to calibrate, or --refine RIG")
@@ -76,9 +80,9 @@ def _calibrate(arguments: argparse.Namespace) -> int:
             f"calibrate: found {len(arguments.captures)} folders, expected the left camera's photographs and the right "
             "camera's; for captures of other scenes give --refine"
         )
-    report = arguments.output.with_suffix(".png")
-    check_absent(arguments.output, arguments.force)
-    check_absent(report, arguments.force)
+    report, page = (arguments.output.with_suffix(suffix) for suffix in (".png", ".html"))
+    for path in (arguments.output, report, page):
+        check_absent(path, arguments.force)
     tables = read_toml(arguments.config) if arguments.config else {}
     options = from_arguments(RigOptions, arguments, tables.get("rig", {}), f"{arguments.config} [rig]")
     corners = from_arguments(CornerOptions, arguments, tables.get("corners", {}), f"{arguments.config} [corners]")
@@ -94,8 +98,10 @@ def _calibrate(arguments: argparse.Namespace) -> int:
         solution = solve_rig(*shown, options, progress, session.lenses)
     write_rig(arguments.output, session.labelled(solution.rig), arguments.force)
     write_report(report, solution, target.points, arguments.force)
+    files = {"the rig": arguments.output, "this page as one picture": report}
+    write_calibration_page(page, solution, session, target.points, files, arguments.force)
     summary = _summary(solution, session, clock)
-    print(json.dumps(summary, indent=2) if arguments.json else _text(summary, arguments.output, report))
+    print(json.dumps(summary, indent=2) if arguments.json else _text(summary, arguments.output, page))
     return 0
 
 
@@ -217,7 +223,7 @@ def _lenses(solution: RigSolution, session: Session) -> list[dict[str, float]]:
     return told
 
 
-def _text(summary: dict[str, Any], output: Path, report: Path) -> str:
+def _text(summary: dict[str, Any], output: Path, page: Path) -> str:
     turn = math.degrees(math.hypot(*summary["rotation_rad"]))
     turn_sd = math.degrees(max(summary["rotation_sd_rad"]))
     worst = max(summary["shots"], key=lambda shot: float(shot["rms_px"]))
@@ -236,5 +242,5 @@ def _text(summary: dict[str, Any], output: Path, report: Path) -> str:
     if summary["rejected"]:
         lines.append(f"rejected, as they contradict the others: {', '.join(summary['rejected'])}")
     lines.append(", ".join(f"{name} {seconds:.1f} s" for name, seconds in summary["seconds"].items()))
-    lines.append(f"rig: {output} (look first at {report})")
+    lines.append(f"rig: {output} (look first at {page})")
     return "\n".join(lines)

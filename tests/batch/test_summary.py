@@ -14,6 +14,7 @@ from lfstereo.batch.jobs import Outcome
 from lfstereo.batch.pairing import Leftover
 from lfstereo.batch.record import Entry
 from lfstereo.batch.summary import SummaryRow, write_summary
+from lfstereo.viewer.template import read_content
 
 
 def rows() -> list[SummaryRow]:
@@ -41,13 +42,17 @@ def test_table(tmp_path: Path) -> None:
 def test_page(tmp_path: Path) -> None:
     alone = Leftover("unpaired", (CaptureFile(tmp_path / "e.LFR", Path("e.LFR")),), "no other <capture>")
     write_summary(tmp_path, rows(), [alone])
-    page = (tmp_path / "summary.html").read_text()
-    assert "1 done, 1 failed, 1 not done" in page
-    assert "src='a%26b/thumbnail.jpg'" in page
-    assert "a&amp;b" in page
-    assert "cut off, &lt;bad&gt;" in page
-    assert "no other &lt;capture&gt;" in page
-    assert "<bad>" not in page
+    content = read_content(tmp_path / "summary.html")
+    assert content["lede"] == "1 done, 1 failed, 1 not done."
+    done, failed, waiting = content["pairs"]
+    assert (done["name"], done["page"], done["picture"]) == ("a&b", "a%26b/report.html", "a%26b/thumbnail.jpg")
+    shown = dict(zip([name for name, _ in content["columns"]], done["figures"], strict=True))
+    assert (shown["valid_share"], shown["mae_px"], shown["depth_low_m"]) == (0.91, 2.5, None)
+    assert (done["seconds"], done["peak_gib"]) == (3.0, 2.1)
+    assert failed == {"name": "c", "state": "failed", "reason": "x.LFR: cut off, <bad>"}
+    assert waiting == {"name": "d", "state": "not done"}
+    assert content["left_out"] == [["unpaired", "e.LFR", "no other <capture>"]]
+    assert "<bad>" not in (tmp_path / "summary.html").read_text()
 
 
 def test_thumbnail_shows_both_pictures(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import cv2
@@ -17,6 +18,8 @@ from lfstereo.pipeline import PairResult, RunOptions, SideResult
 from lfstereo.progress import StageClock
 from lfstereo.results import Inputs, write_results
 from lfstereo.rig.geometry import RectifiedCamera, RectifiedGeometry
+
+from .browser import Page, browsed
 
 ROWS, COLUMNS = 96, 140
 NEAR_PX, FAR_PX = 60.0, 18.0
@@ -97,3 +100,9 @@ def field_file(result_folder: Path) -> Path:
     path = result_folder.parent / "field.h5"
     write_light_field(path, light_field())
     return path
+
+
+@pytest.fixture(scope="session")
+def page(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Page]:
+    """One browser for all tests."""
+    yield from browsed(tmp_path_factory.mktemp("profile"), COLUMNS)
