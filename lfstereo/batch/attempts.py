@@ -6,13 +6,23 @@ import errno
 import threading
 import traceback
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TypeVar
 
 from lfstereo.batch.jobs import Job, Outcome
-from lfstereo.batch.notes import TIME_LIMIT, Note, mark_stopped, next_note, still_mine, write_note
+from lfstereo.batch.notes import (
+    TIME_LIMIT,
+    Note,
+    keep_answer,
+    mark_stopped,
+    next_note,
+    read_answer,
+    still_mine,
+    trace_of,
+    write_note,
+)
 from lfstereo.batch.process import restore_malloc, time_limit
 from lfstereo.errors import LfstereoError
 from lfstereo.progress import Progress, StageClock
@@ -34,10 +44,28 @@ class NotingClock(StageClock):
 
     @contextmanager
     def stage(self, label: str) -> Iterator[Progress]:
-        """Write the note, then measure the ``with`` block."""
+        """Write the note, then measure the ``with`` block.
+
+        Raises
+        ------
+        Superseded
+            If the job was taken over; it would be for nothing to go on.
+        """
+        self.check_not_superseded()
         write_note(self.path, replace(self.note, stage=label))
         with StageClock.stage(self, label) as progress:
             yield progress
+
+    def check_not_superseded(self) -> None:
+        """Refuse to go on, or to make a result visible, when a later attempt has taken the job over.
+
+        Raises
+        ------
+        Superseded
+            If so.
+        """
+        if not still_mine(self.path, self.note):
+            raise Superseded(f"{self.path.stem}: a later batch or attempt took this pair over; its result counts")
 
 
 def attempt(job: JobT, body: Callable[[JobT, NotingClock], Outcome]) -> Outcome:
@@ -48,26 +76,27 @@ def attempt(job: JobT, body: Callable[[JobT, NotingClock], Outcome]) -> Outcome:
     job
         What to do.
     body
-        Does it; :func:`check_not_superseded` guards what it makes visible.
+        Does it; :meth:`NotingClock.check_not_superseded` guards what it makes visible.
     """
     with _ONE_AT_A_TIME:
         restore_malloc()
+        if (known := read_answer(job)) is not None:
+            return known  # of a worker that was lost with its answer, once the work was done
         lost, note = next_note(job)
         if lost is not None and (refused := verdict_on_loss(job, lost)) is not None:
-            job.note.unlink(missing_ok=True)
-            return refused
+            return _left(job, lost, refused)
         clock = NotingClock(path=job.note, note=note)
-        with time_limit(job.time_limit_s, lambda: mark_stopped(job.note, TIME_LIMIT)):
+        trace = trace_of(job, note.attempt)
+        with time_limit(job.time_limit_s, lambda: mark_stopped(job.note, note, TIME_LIMIT), trace):
             outcome = _isolated(job, clock, body)
-        if still_mine(job, note):
-            job.note.unlink(missing_ok=True)
-        return replace(
+        outcome = replace(
             outcome,
             seconds={name: round(seconds, 3) for name, seconds in clock.seconds.items()},
             peak_gib=round(max(clock.peak_gib.values(), default=0.0), 3),
             attempt=note.attempt,
             workers=(note.worker,),
         )
+        return _left(job, note, outcome)
 
 
 def verdict_on_loss(job: Job, lost: Note) -> Outcome | None:
@@ -85,20 +114,17 @@ def verdict_on_loss(job: Job, lost: Note) -> Outcome | None:
     return None
 
 
-def check_not_superseded(job: Job, clock: NotingClock) -> None:
-    """Refuse to make a result visible when a later attempt has taken the job over.
-
-    Raises
-    ------
-    Superseded
-        If so.
-    """
-    if not still_mine(job, clock.note):
-        raise Superseded(f"{job.name}: a later batch or attempt took this pair over; its result counts")
-
-
 class Superseded(LfstereoError):
     """This attempt is out of date."""
+
+
+def _left(job: Job, note: Note, outcome: Outcome) -> Outcome:
+    """Leave the outcome on the storage, if there is room, unless another attempt is at the job by now."""
+    if still_mine(job.note, note):
+        with suppress(OSError):
+            keep_answer(job, outcome)
+        job.note.unlink(missing_ok=True)
+    return outcome
 
 
 def _isolated(job: JobT, clock: NotingClock, body: Callable[[JobT, NotingClock], Outcome]) -> Outcome:

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import asyncio
 import secrets
 from collections.abc import Callable
-from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, ThreadPoolExecutor
+from concurrent.futures import Executor
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 from lfstereo import __version__
 from lfstereo.batch.crew import PairWork, Step
@@ -21,10 +20,9 @@ GPU, CPU = "GPU", "CPU"
 
 Where a GPU is declared but no CPU, workers with a GPU may be given the other steps too.
 """
-T = TypeVar("T")
 _CONNECT_S = 20
 _FIRST_WORKER_S = 60
-_MOST_WAITERS = 1000
+_CLOSE_S = 5
 _WAITING_PER_WORKER = 1
 """Jobs beyond the running ones that wait at the scheduler, so that no worker is idle for a round trip."""
 
@@ -58,8 +56,12 @@ class ClusterCrew:
             ) from error
         try:
             self._check(address, output)
-        except BaseException:
-            self._client.close()
+        except BaseException as error:
+            self.close(True)
+            if isinstance(error, OSError):
+                raise ConfigError(
+                    f"scheduler = {address}: lost while its workers were looked at ({error}); start again"
+                ) from error
             raise
         workers, gpus, plain = self._count(None), self._count(GPU), self._count(CPU)
         if gpus and gpus < workers:
@@ -77,11 +79,16 @@ class ClusterCrew:
     def stop(self, _: Note, /) -> None:
         """Do nothing: a worker ends itself, and the scheduler drops one that does not answer (``worker-ttl``)."""
 
-    def close(self, at_once: bool) -> None:
-        """Leave the cluster; it goes on without us."""
-        for step in self.steps if at_once else ():
-            step.executor.shutdown(wait=False)
-        self._client.close(timeout=5)
+    def lost_a_worker(self, error: Exception, /) -> bool:
+        """Return whether Dask gave a call up because workers died that held it, be it that it only waited there."""
+        from distributed.scheduler import KilledWorker
+
+        return isinstance(error, KilledWorker)
+
+    def close(self, _: bool, /) -> None:
+        """Leave the cluster; what it still works on for us it drops, or it throws the result away."""
+        with suppress(OSError):  # it may be gone itself
+            self._client.close(timeout=_CLOSE_S)
 
     def _workers(self) -> dict[str, Any]:
         found: dict[str, Any] = self._client.scheduler_info(n_workers=-1).get("workers", {})
@@ -92,15 +99,18 @@ class ClusterCrew:
         return sum(resource is None or resource in worker["resources"] for worker in self._workers().values())
 
     def _executor(self, resource: str | None) -> Executor:
-        return TaskExecutor(self._client, {} if resource is None else {resource: 1})
+        wanted = {} if resource is None else {"resources": {resource: 1}}
+        executor: Executor = self._client.get_executor(pure=False, **wanted)
+        return executor
 
     def _capacity(self, resource: str | None) -> Callable[[], int]:
         workers = self._count(resource)
 
         def now() -> int:
             nonlocal workers
-            with suppress(OSError, RuntimeError):  # a lost scheduler shows in the futures
-                workers = self._count(resource)
+            if self._client.status == "running":  # a lost scheduler shows in the futures
+                with suppress(OSError, RuntimeError):
+                    workers = self._count(resource)
             return max(1, workers * (1 + _WAITING_PER_WORKER))
 
         return now
@@ -114,51 +124,21 @@ class ClusterCrew:
         sign = output / WORK_FOLDER / f"seen.{word}"
         sign.write_text(word, "utf-8")
         try:
-            answers = self._client.run(look_around, str(sign))
+            answers = self._client.run(look_around, str(sign), on_error="return")
         finally:
             sign.unlink(missing_ok=True)
-        for worker, (seen, version) in answers.items():
+        for worker, answer in answers.items():
+            if isinstance(answer, OSError):
+                continue  # it was lost at this moment
+            if isinstance(answer, Exception):
+                raise InputError(f"{worker}: lfstereo cannot be used there ({answer}); install {__version__} as here")
+            seen, version = answer
             if seen != word:
                 raise InputError(f"{output}: worker {worker} does not see this folder; put it on shared storage")
             if version != __version__:
                 raise InputError(
                     f"{worker}: found lfstereo {version}, expected {__version__} as here; install the same there"
                 )
-
-
-class TaskExecutor(Executor):
-    """The workers of a client that have some resources, as an executor.
-
-    ``Client.get_executor`` would do, but the future it gives never ends when a worker is lost while its answer is being
-    fetched; here a thread waits for each answer and passes on whatever comes.
-    """
-
-    def __init__(self, client: Any, resources: dict[str, int]) -> None:
-        self._client, self._resources = client, resources
-        self._waiters = ThreadPoolExecutor(_MOST_WAITERS, "answer")
-
-    def submit(self, fn: Callable[..., T], /, *args: Any, **kwargs: Any) -> Future[T]:
-        """Hand a call to a worker."""
-        task = self._client.submit(fn, *args, **kwargs, pure=False, resources=self._resources or None)
-        return self._waiters.submit(_answer, task)
-
-    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        """Take no more calls."""
-        self._waiters.shutdown(wait, cancel_futures=cancel_futures)
-
-
-def _answer(task: Any) -> Any:
-    """Wait for a task; a lost worker or scheduler ends it as it would end a local pool's future."""
-    from distributed.scheduler import KilledWorker
-
-    try:
-        return task.result()
-    except KilledWorker as error:
-        raise BrokenExecutor(str(error)) from error
-    except (Exception, asyncio.CancelledError) as error:
-        if task.status == "error":  # the call itself failed
-            raise
-        raise CancelledError(str(error)) from error
 
 
 def look_around(path: str) -> tuple[str, str]:

@@ -27,6 +27,16 @@ from lfstereo.batch.summary import SummaryRow, write_summary
 from lfstereo.batch.work import convert_pair, focus_only, match_only, prepare_camera
 
 PAIR_WORK = PairWork(convert_pair, focus_only, match_only)
+_LEFT_BEHIND = (
+    "notes/{0}.json",
+    "notes/.{0}.json.*",
+    f"notes/{{0}}.{'?' * 16}.*.trace",
+    f"answers/{{0}}.{'?' * 16}.json",
+    f"answers/.{{0}}.{'?' * 16}.json.*",
+    "focused/{0}.npz",
+    "focused/.{0}.npz.????????.partial",
+)
+"""What a pair of some name may leave in the work folder; another pair's name may begin with this one's and a dot."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,10 +106,9 @@ def _clean(request: BatchRequest, plan: Plan) -> None:
     names = ["*"] if whole else [glob.escape(pair.files.name) for pair in plan.pairs]
     for name in names:
         for scratch in output.glob(f".{name}.????????.partial"):
-            shutil.rmtree(scratch) if scratch.is_dir() else scratch.unlink(missing_ok=True)
-        for folder in ("notes", "focused"):
-            place = output / WORK_FOLDER / folder
-            for leftover in (*place.glob(f"{name}.*"), *place.glob(f".{name}.*")):
+            shutil.rmtree(scratch, ignore_errors=True)  # a cluster's worker may be writing there still
+        for form in _LEFT_BEHIND:
+            for leftover in (output / WORK_FOLDER).glob(form.format(name)):
                 leftover.unlink(missing_ok=True)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from concurrent.futures import Executor
+from concurrent.futures import BrokenExecutor, Executor
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -43,10 +43,13 @@ class Crew(Protocol):
     """One line for the user."""
     steps: tuple[Step, ...]
 
+    def lost_a_worker(self, error: Exception, /) -> bool:
+        """Return whether a call ended with this error because its worker died."""
+
     def stop(self, note: Note, /) -> None:
         """End a worker that is over its time and cannot end itself, where that can be done from here."""
 
-    def close(self, at_once: bool) -> None:
+    def close(self, at_once: bool, /) -> None:
         """Let the workers go."""
 
 
@@ -71,12 +74,16 @@ class LocalCrew:
             f"{cores} cores, {pair_gib:.1f} GiB each of {free:.1f} GiB free"
         )
 
+    def lost_a_worker(self, error: Exception, /) -> bool:
+        """Return whether its pool broke."""
+        return isinstance(error, BrokenExecutor)
+
     def stop(self, note: Note, /) -> None:
         """Kill the worker."""
         for pool in self._pools:
             pool.kill(note.process)
 
-    def close(self, at_once: bool) -> None:
+    def close(self, at_once: bool, /) -> None:
         """End the processes."""
         for pool in self._pools:
             pool.shutdown(wait=not at_once)

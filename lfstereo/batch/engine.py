@@ -1,18 +1,22 @@
-"""Hands jobs to executors, one step after the other, and takes every end of them in: done, failed or lost."""
+"""Hands jobs to executors, one step after the other, and takes every end of them in: done, failed or lost.
+
+What a worker left on the storage counts before what its future says, which may hang or err where a worker is lost.
+"""
 
 from __future__ import annotations
 
+import secrets
 import time
 from collections import Counter, deque
 from collections.abc import Callable, Sequence
-from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Future, wait
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait
 from dataclasses import dataclass, replace
 from typing import Any
 
-from lfstereo.batch.attempts import DISK_FULL, verdict_on_loss
+from lfstereo.batch.attempts import DISK_FULL, SUPERSEDED, verdict_on_loss
 from lfstereo.batch.crew import Crew, Step
 from lfstereo.batch.jobs import Job, Outcome, together
-from lfstereo.batch.notes import TIME_LIMIT, Note, read_note
+from lfstereo.batch.notes import TIME_LIMIT, Note, lost_note, read_answer, read_note
 
 _TICK_S = 1.0
 _GRACE_S = 20.0
@@ -57,6 +61,7 @@ class Engine:
         self._flying: dict[Future[Outcome], Flight] = {}
         self._lost: Counter[str] = Counter()
         self._seen: dict[tuple[str, int, int], float] = {}
+        self._answered: set[str] = set()
         self._looked = 0.0
         self._stopped = ""
 
@@ -96,25 +101,35 @@ class Engine:
                     return
 
     def _take_in(self, flight: Flight, future: Future[Outcome]) -> None:
-        job = flight.job
+        """Take in a job whose future ended."""
+        answer = read_answer(flight.job)
+        if answer is not None:
+            self._accept(flight, answer)
+            return
         try:
             outcome = future.result()
         except CancelledError:
             self._stopped = "the scheduler was lost"
-            return
-        except BrokenExecutor:
+        except Exception as error:
+            if self._crew.lost_a_worker(error):
+                self._again(flight)
+                return
+            words = " ".join(str(error).split())
+            self._accept(flight, Outcome(flight.job.name, "failed", f"worker: {words}", type(error).__name__))
+        else:
+            self._accept(flight, outcome)
+
+    def _accept(self, flight: Flight, outcome: Outcome) -> None:
+        """Go on with what a worker made of a job."""
+        if outcome.kind == SUPERSEDED:  # by work of an earlier batch that a cluster did not drop in time
             self._again(flight)
             return
-        except Exception as error:
-            words = " ".join(str(error).split())
-            lost = read_note(job.note)
-            verdict = verdict_on_loss(replace(job, retries=0), lost) if lost and lost.token == job.token else None
-            outcome = verdict or Outcome(job.name, "failed", f"worker: {words}", type(error).__name__)
         outcome = together(flight.before, outcome)
         if outcome.kind == DISK_FULL:
             self._stopped = outcome.reason
         if outcome.state == "focused":
-            self._waiting[flight.at + 1].append(Flight(job, flight.at + 1, outcome))
+            following = replace(flight.job, token=secrets.token_hex(8))
+            self._waiting[flight.at + 1].append(Flight(following, flight.at + 1, outcome))
         else:
             self._ended(outcome)
 
@@ -122,12 +137,10 @@ class Engine:
         """Try a job again whose worker died, unless it died of the job too often."""
         job = flight.job
         self._lost[job.name] += 1
-        note = read_note(job.note)
-        if note is None or note.token != job.token:
-            note = Note(job.token, self._lost[job.name], "", 0, "start", 0.0)
+        note = lost_note(job) or Note(job.token, self._lost[job.name], "", 0, "start", 0.0)
         since = self._seen.get((job.name, flight.at, note.attempt), time.monotonic())
         if time.monotonic() - since >= job.time_limit_s:
-            note = replace(note, stopped=TIME_LIMIT)  # its hard stop left no last words
+            note = replace(note, stopped=TIME_LIMIT)  # it did not answer any more, and was killed
         verdict = verdict_on_loss(job, replace(note, attempt=max(note.attempt, self._lost[job.name])))
         if verdict is None:
             self._waiting[flight.at].appendleft(flight)
@@ -136,9 +149,18 @@ class Engine:
             self._ended(together(flight.before, verdict))
 
     def _look_after(self) -> None:
-        """Read the workers' notes; end a worker that is over its time and did not end itself."""
+        """Read what the workers left; end a worker that is over its time and did not end itself.
+
+        An answer is taken in without its future if that has not ended a tick later.
+        """
         notes = []
-        for flight in self._flying.values():
+        for future, flight in list(self._flying.items()):
+            answer = read_answer(flight.job)
+            if answer is not None and flight.job.token in self._answered:
+                self._accept(self._flying.pop(future), answer)
+                continue
+            if answer is not None:
+                self._answered.add(flight.job.token)
             note = read_note(flight.job.note)
             if note is None or note.token != flight.job.token:
                 continue

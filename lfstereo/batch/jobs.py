@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import Literal, TypeAlias
+from typing import Any, Literal, TypeAlias
 
 from lfstereo.batch.stamps import FileStamp
 from lfstereo.pipeline import RunOptions
 
 WORK_FOLDER = ".batch"
-"""Hidden folder in the output: notes of running workers, focal stacks on their way."""
+"""Hidden folder in the output: notes and answers of workers, focal stacks on their way."""
 State = Literal["done", "focused", "failed"]
 
 
@@ -23,7 +23,7 @@ class Job:
     output: Path
     """Output folder of the batch, absolute, seen alike by all workers."""
     token: str
-    """Of the batch that handed it out; work of an earlier batch that is still running is thrown away."""
+    """Of this step of it in this batch; work of an earlier batch that is still running is thrown away."""
     retries: int
     """New attempts after a lost worker."""
     time_limit_s: float
@@ -32,6 +32,11 @@ class Job:
     def note(self) -> Path:
         """File in which its worker tells what it does."""
         return self.output / WORK_FOLDER / "notes" / f"{self.name}.json"
+
+    @property
+    def answer(self) -> Path:
+        """File in which its worker leaves what became of it."""
+        return self.output / WORK_FOLDER / "answers" / f"{self.name}.{self.token}.json"
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,6 +82,8 @@ class Outcome:
     inputs: dict[str, FileStamp] = field(default_factory=dict)
     """Files that the result was made from, by role."""
     weights_sha256: str = ""
+    result_sha256: str = ""
+    """Of the run.toml in the result folder, by which this conversion is told from every other."""
     warnings: tuple[str, ...] = ()
     """What the user must know of a result, one line each."""
     figures: dict[str, float] = field(default_factory=dict)
@@ -85,6 +92,25 @@ class Outcome:
     attempt: int = 1
     workers: tuple[str, ...] = ()
     """``host:process`` of each step."""
+
+
+def values_of(outcome: Outcome) -> dict[str, Any]:
+    """Return an outcome as plain values, those that are empty left out."""
+    return {name: value for name, value in asdict(outcome).items() if value}
+
+
+def outcome_from(values: Mapping[str, Any]) -> Outcome:
+    """Return the outcome of which :func:`values_of` gave the values; others among them are passed over.
+
+    Raises
+    ------
+    KeyError, TypeError, AttributeError
+        If they are of something else.
+    """
+    known = {name: values[name] for name in Outcome.__dataclass_fields__ if name in values}
+    known["inputs"] = {role: FileStamp(**stamp) for role, stamp in values.get("inputs", {}).items()}
+    lists = {name: tuple(values.get(name, ())) for name in ("warnings", "workers")}
+    return Outcome(**known | lists)
 
 
 def together(first: Outcome | None, last: Outcome) -> Outcome:

@@ -11,7 +11,15 @@ from lfstereo.batch.figures import THUMBNAIL
 from lfstereo.batch.options import BatchOptions
 from lfstereo.batch.pairing import PairFiles, Pairing, pair_captures
 from lfstereo.batch.record import Entry, Record, read_record
-from lfstereo.batch.stamps import FileStamp, counted_options, fingerprint, model_sha256, stamp, white_listing
+from lfstereo.batch.stamps import (
+    FileStamp,
+    counted_options,
+    fingerprint,
+    model_sha256,
+    result_sha256,
+    stamp,
+    white_listing,
+)
 from lfstereo.errors import AssetError, InputError, OutputError
 from lfstereo.pipeline import RunOptions
 from lfstereo.rig.rig import read_rig
@@ -105,8 +113,19 @@ def _planned(files: PairFiles, request: BatchRequest, plan: Plan) -> PlannedPair
         return PlannedPair(files, False, "new" if not ours else "its record is missing")
     if entry.outcome.state != "done":
         return PlannedPair(files, False, f"failed before: {entry.outcome.reason}")
-    why = "its result is gone" if not ours else _changed(files, request, plan, entry)
+    why = _no_result(folder, entry) or _changed(files, request, plan, entry)
     return PlannedPair(files, not why, why)
+
+
+def _no_result(folder: Path, entry: Entry) -> str:
+    """Return why a folder is not the result that the record speaks of; empty if it is.
+
+    A batch that is killed between the two leaves a result that the record does not know.
+    """
+    if not (folder / THUMBNAIL).is_file():
+        return "its result is gone"
+    made = entry.outcome.result_sha256
+    return "" if not made or result_sha256(folder) == made else "its result is not the recorded one"
 
 
 def _changed(files: PairFiles, request: BatchRequest, plan: Plan, entry: Entry) -> str:

@@ -11,6 +11,7 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import TextIO
 
 _GRACE_S = 2.0
 """Time for the watching thread to act before the hard stop, which also ends code that holds the interpreter."""
@@ -55,7 +56,7 @@ def restore_malloc() -> None:
 
 
 @contextmanager
-def time_limit(limit_s: float, last_words: Callable[[], None]) -> Iterator[None]:
+def time_limit(limit_s: float, last_words: Callable[[], None], trace: Path) -> Iterator[None]:
     """End this process if the block takes longer.
 
     Parameters
@@ -64,6 +65,8 @@ def time_limit(limit_s: float, last_words: Callable[[], None]) -> Iterator[None]
         Wall time.
     last_words
         Called before the end, where the interpreter still runs.
+    trace
+        Written where it does not: the place in the code. Nothing is in it otherwise; removed at the end of the block.
     """
 
     def stop() -> None:
@@ -73,11 +76,21 @@ def time_limit(limit_s: float, last_words: Callable[[], None]) -> Iterator[None]
 
     timer = threading.Timer(limit_s, stop)
     timer.daemon = True
-    with Path(os.devnull).open("w") as nowhere:
+    with _opened(trace) as file:
         timer.start()
-        faulthandler.dump_traceback_later(limit_s + _GRACE_S, exit=True, file=nowhere)
+        faulthandler.dump_traceback_later(limit_s + _GRACE_S, exit=True, file=file)
         try:
             yield
         finally:
             timer.cancel()
             faulthandler.cancel_dump_traceback_later()
+    with suppress(OSError):
+        trace.unlink()
+
+
+def _opened(trace: Path) -> TextIO:
+    """Return the file opened, or nowhere if it cannot be: what else cannot be written there will be told."""
+    with suppress(OSError):
+        trace.parent.mkdir(parents=True, exist_ok=True)
+        return trace.open("w")
+    return Path(os.devnull).open("w")

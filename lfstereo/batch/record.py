@@ -9,13 +9,12 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from lfstereo.batch.jobs import Outcome
-from lfstereo.batch.stamps import FileStamp
+from lfstereo.batch.jobs import Outcome, outcome_from, values_of
 from lfstereo.errors import OutputError
 
 RECORD = "record.jsonl"
@@ -87,7 +86,7 @@ def append(path: Path, outcome: Outcome, fingerprint: str, options: Mapping[str,
         If it cannot be written; nothing but a torn line, which is passed over, is left then.
     """
     values = {"pair": outcome.name, "state": outcome.state, "written": datetime.now(UTC).isoformat()}
-    rest = {name: value for name, value in asdict(outcome).items() if name not in ("name", "state") and value}
+    rest = {name: value for name, value in values_of(outcome).items() if name not in ("name", "state")}
     extra = {"fingerprint": fingerprint, "options": dict(options), "program": program}
     line = json.dumps(values | rest | {name: value for name, value in extra.items() if value}) + "\n"
     try:
@@ -110,12 +109,4 @@ def _parsed(line: dict[str, Any]) -> Entry:
     own: dict[str, Any] = {
         name: line[name] for name in ("written", "fingerprint", "options", "program") if name in line
     }
-    names = set(Outcome.__dataclass_fields__) - {"name", "inputs", "workers", "warnings"}
-    outcome = Outcome(
-        name=str(line["pair"]),
-        inputs={role: FileStamp(**values) for role, values in line.get("inputs", {}).items()},
-        workers=tuple(line.get("workers", ())),
-        warnings=tuple(line.get("warnings", ())),
-        **{name: line[name] for name in names if name in line},
-    )
-    return Entry(outcome, **{"fingerprint": "", **own})
+    return Entry(outcome_from(line | {"name": str(line["pair"])}), **{"fingerprint": "", **own})

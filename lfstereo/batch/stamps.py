@@ -80,6 +80,11 @@ def white_listing(whites: Path | None) -> str:
     return hashlib.sha256("\n".join(lines).encode()).hexdigest()
 
 
+def result_sha256(folder: Path) -> str:
+    """Return the sha256 of a result folder's ``run.toml``: its times to the millisecond tell it from every other."""
+    return sha256_of(folder / "run.toml")
+
+
 def model_sha256(model: str) -> str:
     """Return the sha256 of a model's weights as its card states it; a worker verifies it when it loads them.
 

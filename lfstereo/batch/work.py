@@ -5,12 +5,12 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from lfstereo.batch.attempts import NotingClock, attempt, check_not_superseded
+from lfstereo.batch.attempts import NotingClock, attempt
 from lfstereo.batch.figures import quality_figures, write_thumbnail
 from lfstereo.batch.handover import read_focused, write_focused
 from lfstereo.batch.held import Held
 from lfstereo.batch.jobs import CameraJob, Outcome, PairJob, together
-from lfstereo.batch.stamps import stamp
+from lfstereo.batch.stamps import result_sha256, stamp
 from lfstereo.container import read_capture
 from lfstereo.lightfield.calibration import decode_with
 from lfstereo.lightfield.field import LightField
@@ -109,9 +109,16 @@ def _match(job: PairJob, focused: FocusedPair, clock: NotingClock) -> Outcome:
             write_thumbnail(out)
         with clock.stage("to disk"):
             _to_disk(out)
-        check_not_superseded(job, clock)
+        made = result_sha256(out)
+        clock.check_not_superseded()
     _to_disk(job.output, deep=False)
-    return Outcome(job.name, "done", weights_sha256=network.card.sha256, figures=quality_figures(report, result))
+    return Outcome(
+        job.name,
+        "done",
+        weights_sha256=network.card.sha256,
+        result_sha256=made,
+        figures=quality_figures(report, result),
+    )
 
 
 def _nobody(warning: str) -> None:

@@ -7,9 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from lfstereo.batch.attempts import SUPERSEDED, NotingClock, attempt, check_not_superseded, verdict_on_loss
+from lfstereo.batch.attempts import SUPERSEDED, NotingClock, attempt, verdict_on_loss
 from lfstereo.batch.jobs import Job, Outcome
-from lfstereo.batch.notes import Note, read_note, write_note
+from lfstereo.batch.notes import Note, lost_note, mark_stopped, read_answer, read_note, trace_of, write_note
+from lfstereo.batch.stamps import FileStamp
 
 LIMIT_S = 600.0
 
@@ -38,14 +39,47 @@ def test_attempt_that_was_taken_over_shows_nothing(job: Job) -> None:
     """Work of a dead batch that still runs on a cluster finds another batch's note."""
     theirs = Note("theirs", 1, "host", 1, "start", 0.0)
 
-    def body(job: Job, clock: NotingClock) -> Outcome:
+    def shows(job: Job, clock: NotingClock) -> Outcome:
         write_note(job.note, theirs)
-        check_not_superseded(job, clock)
+        clock.check_not_superseded()
         raise AssertionError("not refused")
 
-    outcome = attempt(job, body)
-    assert (outcome.state, outcome.kind) == ("failed", SUPERSEDED)
+    def goes_on(job: Job, clock: NotingClock) -> Outcome:
+        write_note(job.note, theirs)
+        with clock.stage("rectify left"):
+            raise AssertionError("not refused")
+
+    def times_out(job: Job, clock: NotingClock) -> Outcome:
+        write_note(job.note, theirs)
+        mark_stopped(job.note, clock.note, "time limit")
+        return Outcome(job.name, "done")
+
+    for body in (shows, goes_on):
+        outcome = attempt(job, body)
+        assert (outcome.state, outcome.kind) == ("failed", SUPERSEDED)
+        assert read_note(job.note) == theirs
+    attempt(job, times_out)
     assert read_note(job.note) == theirs
+    assert read_answer(job) is None
+
+
+def test_answer_is_left_and_the_work_not_done_again(job: Job) -> None:
+    """A cluster repeats a call whose worker was lost before it gave its answer."""
+
+    def body(job: Job, clock: NotingClock) -> Outcome:
+        with clock.stage("disparity"):
+            stamps = {"left": FileStamp("/x", 7, 8, "9")}
+        return Outcome(job.name, "done", inputs=stamps, figures={"valid_share": 0.5}, warnings=("dark",))
+
+    def again(job: Job, clock: NotingClock) -> Outcome:
+        raise AssertionError("done twice")
+
+    outcome = attempt(job, body)
+    assert read_answer(job) == outcome
+    assert attempt(job, again) == outcome
+    assert read_answer(replace(job, token="of the next step")) is None
+    job.answer.write_text(job.answer.read_text()[:40])
+    assert read_answer(job) is None
 
 
 def test_lost_attempts_are_counted_by_the_note(job: Job) -> None:
@@ -55,12 +89,25 @@ def test_lost_attempts_are_counted_by_the_note(job: Job) -> None:
     lost = Note("mine", 1, "host", 1, "disparity", 0.0)
     write_note(job.note, lost)
     assert attempt(job, body).attempt == 2
+    job.answer.unlink()
     write_note(job.note, replace(lost, attempt=2))
     refused = attempt(job, body)
     assert refused.state == "failed"
     assert "lost 2 times, last in stage 'disparity' on host:1" in refused.reason
+    assert read_answer(job) == refused
+    job.answer.unlink()
     write_note(job.note, replace(lost, token="an earlier batch", attempt=9))
     assert attempt(job, body).attempt == 1
+
+
+def test_attempt_that_hung_without_last_words(job: Job) -> None:
+    """Its process was ended from outside the interpreter, which left where it hung."""
+    write_note(job.note, Note("mine", 1, "host", 1, "disparity", 0.0))
+    trace_of(job, 1).write_text("")
+    assert lost_note(job) == read_note(job.note)
+    trace_of(job, 1).write_text("Timeout (0:10:02)!")
+    refused = attempt(job, lambda job, clock: Outcome(job.name, "done"))
+    assert refused.reason.startswith("stopped after 600 s in stage 'disparity'")
 
 
 def test_time_limit_is_not_tried_again(job: Job) -> None:

@@ -15,7 +15,7 @@ from lfstereo.batch.jobs import Outcome
 from lfstereo.batch.options import BatchOptions
 from lfstereo.batch.plan import BatchRequest, plan_batch
 from lfstereo.batch.record import append, record_path
-from lfstereo.batch.stamps import counted_options, fingerprint, model_sha256, stamp, white_listing
+from lfstereo.batch.stamps import counted_options, fingerprint, model_sha256, result_sha256, stamp, white_listing
 from lfstereo.errors import AssetError, InputError, OutputError
 from lfstereo.pipeline import RunOptions
 
@@ -44,9 +44,11 @@ def finished(tmp_path: Path) -> BatchRequest:
     result = request.output / "a"
     result.mkdir(parents=True)
     (result / THUMBNAIL).touch()
+    (result / "run.toml").write_text("seconds = 1.234\n")
     inputs = {side: stamp(request.captures / "a" / f"{side}.h5") for side in ("left", "right")}
     inputs |= {"rig": stamp(request.rig), "white left": stamp(tmp_path / "whites" / "MOD_1.RAW")}
-    outcome = Outcome("a", "done", inputs=inputs, weights_sha256=model_sha256(MODEL))
+    weights = model_sha256(MODEL)
+    outcome = Outcome("a", "done", inputs=inputs, weights_sha256=weights, result_sha256=result_sha256(result))
     found = fingerprint(inputs, request.run, outcome.weights_sha256, white_listing(request.whites))
     append(record_path(request.output, (1, 1)), outcome, found, counted_options(request.run), "0.1.0")
     return request
@@ -102,6 +104,14 @@ def test_changed_or_new_white_images(finished: BatchRequest) -> None:
 def test_result_or_capture_that_is_gone(finished: BatchRequest) -> None:
     shutil.rmtree(finished.output / "a")
     assert why(finished) == "its result is gone"
+
+
+def test_result_that_the_record_does_not_know(finished: BatchRequest) -> None:
+    """As a batch with other options leaves it that is killed between result and record."""
+    (finished.output / "a" / "run.toml").write_text("seconds = 1.235\n")
+    assert why(finished) == "its result is not the recorded one"
+    (finished.output / "a" / "run.toml").unlink()
+    assert why(finished) == "its result is not the recorded one"
 
 
 def test_failed_before(finished: BatchRequest) -> None:
