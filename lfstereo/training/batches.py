@@ -6,6 +6,7 @@ import queue
 import threading
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 import torch
@@ -14,9 +15,9 @@ from torch import Tensor
 
 from lfstereo.arrays import Float32
 from lfstereo.errors import ConfigError
+from lfstereo.training.atlas import scene_bank
 from lfstereo.training.pool import DISPARITY_STEPS_PER_PX, Pool
 from lfstereo.training.samples import pair_sample
-from lfstereo.training.textures import texture_bank
 
 STEPS_PER_BANK = 250
 
@@ -40,17 +41,20 @@ class Batch:
 class PairBatches:
     """All-in-focus pairs, rendered when asked for; never the same scene twice."""
 
-    def __init__(self, seed: int, batch: int, height: int, width: int, textures: int) -> None:
+    def __init__(
+        self, seed: int, batch: int, height: int, width: int, textures: int, kind: str = "layers", atlas: str = ""
+    ) -> None:
         self.seed, self.batch, self.height, self.width, self.textures = seed, batch, height, width, textures
+        self.kind, self.atlas = kind, atlas
         self._bank: tuple[int, Float32] = (-1, np.empty(0, np.float32))
 
     def __call__(self, step: int) -> Batch:
         """Render the batch of one step."""
         number = step // STEPS_PER_BANK
         if self._bank[0] != number:
-            self._bank = (number, texture_bank(self.seed * 100003 + number, self.textures))
+            self._bank = (number, scene_bank(self.kind, self.seed * 100003 + number, self.textures, self.atlas))
         rng = np.random.default_rng([self.seed, 1, step])
-        samples = [pair_sample(rng, self._bank[1], self.height, self.width) for _ in range(self.batch)]
+        samples = [pair_sample(rng, self._bank[1], self.height, self.width, self.kind) for _ in range(self.batch)]
         empty = torch.empty(0)
         return Batch(
             _images(np.stack([s.left for s in samples])),
@@ -63,10 +67,15 @@ class PairBatches:
 
 
 class PoolBatches:
-    """Stack pairs from a pool, mirrored, flipped, recoloured; cropped to ``crop`` (height, width) if that is given."""
+    """Stack pairs from a pool, mirrored, flipped, recoloured; cropped to ``crop`` (height, width) if that is given.
 
-    def __init__(self, pool: Pool, seed: int, batch: int, crop: tuple[int, int] | None = None) -> None:
-        self.pool, self.seed, self.batch, self.crop = pool, seed, batch, crop
+    ``eyes`` says for how many of the eyes, from the left, the stacks are read at all.
+    """
+
+    def __init__(
+        self, pool: Pool, seed: int, batch: int, crop: tuple[int, int] | None = None, eyes: Literal[0, 1, 2] = 2
+    ) -> None:
+        self.pool, self.seed, self.batch, self.crop, self.eyes = pool, seed, batch, crop, eyes
 
     def __call__(self, step: int) -> Batch:
         """Pick and vary the batch of one step.
@@ -82,10 +91,12 @@ class PoolBatches:
             raise ConfigError(f"pool: {len(ready)} samples are rendered, expected {self.batch} or more; fill it first")
         parts = [self._sample(rng, int(i)) for i in rng.choice(ready, self.batch, replace=False)]
         stacks, sharp, disparity, valid = (torch.stack(p) for p in zip(*parts, strict=True))
-        return Batch(sharp[:, 0], sharp[:, 1], disparity, valid, stacks[:, 0], stacks[:, 1])
+        none = torch.empty(0)
+        read = [stacks[:, eye] if eye < self.eyes else none for eye in (0, 1)]
+        return Batch(sharp[:, 0], sharp[:, 1], disparity, valid, *read)
 
     def _sample(self, rng: np.random.Generator, index: int) -> tuple[Tensor, Tensor, Tensor, Tensor]:
-        """One sample as ``(2, 16, 3, H, W)``, ``(2, 3, H, W)``, ``(1, H, W)``, ``(1, H, W)``."""
+        """One sample as ``(eyes, 16, 3, H, W)``, ``(2, 3, H, W)``, ``(1, H, W)``, ``(1, H, W)``."""
         stacks, sharp = self.pool.stacks[index], self.pool.sharp[index]
         disparity, valid = self.pool.disparity[index], self.pool.valid[index]
         change = draw_variation(rng, (disparity.shape[1], disparity.shape[2]), self.crop)
@@ -101,7 +112,7 @@ class PoolBatches:
             stacks, sharp = stacks[:, :, ::-1], sharp[:, ::-1]
             disparity, valid = disparity[:, ::-1], valid[:, ::-1]
         return (
-            torch.from_numpy(change.tone[stacks[..., change.channels]]).movedim(-1, 2).contiguous(),
+            torch.from_numpy(change.tone[stacks[: self.eyes, ..., change.channels]]).movedim(-1, 2).contiguous(),
             torch.from_numpy(change.tone[sharp[..., change.channels]]).movedim(-1, 1).contiguous(),
             torch.from_numpy(disparity[left : left + 1].astype(np.float32) / (100 * DISPARITY_STEPS_PER_PX)),
             torch.from_numpy(np.array(valid[left : left + 1]) > 0),

@@ -16,8 +16,8 @@ from lfstereo.arrays import Float32, UInt8, UInt16
 from lfstereo.conventions import SLICES_DEFAULT
 from lfstereo.errors import ConfigError
 from lfstereo.progress import Progress, silent
+from lfstereo.training.atlas import scene_bank
 from lfstereo.training.samples import stack_sample
-from lfstereo.training.textures import texture_bank
 
 DISPARITY_STEPS_PER_PX = 256
 _PER_BANK = 64
@@ -75,17 +75,19 @@ def open_pool(folder: Path, count: int, height: int, width: int, seed: int) -> P
     return Pool(**arrays)
 
 
-def fill_pool(pool: Pool, seed: int, textures: int, progress: Progress = silent) -> None:
-    """Render every sample that is not ready yet."""
+def fill_pool(
+    pool: Pool, seed: int, textures: int, progress: Progress = silent, kind: str = "layers", atlas: str = ""
+) -> None:
+    """Render every sample that is not ready yet; see :func:`scene_bank` for ``kind`` and ``atlas``."""
     count, _, height, width = pool.disparity.shape
-    bank, bank_number = texture_bank(seed, 1), -1
+    bank, bank_number = scene_bank(kind, seed, 1), -1
     for index in range(count):
         if pool.ready[index]:
             continue
         if index // _PER_BANK != bank_number:
             bank_number = index // _PER_BANK
-            bank = texture_bank(seed * 100003 + bank_number, textures)
-        sample = stack_sample(np.random.default_rng([seed, 2, index]), bank, height, width)
+            bank = scene_bank(kind, seed * 100003 + bank_number, textures, atlas)
+        sample = stack_sample(np.random.default_rng([seed, 2, index]), bank, height, width, kind=kind)
         pool.stacks[index] = np.round(sample.stacks * 255)
         pool.sharp[index] = np.round(sample.sharp * 255)
         pool.disparity[index] = np.round(np.clip(sample.disparity, 0, 255) * DISPARITY_STEPS_PER_PX)

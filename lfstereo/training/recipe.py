@@ -6,18 +6,31 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from lfstereo.network.bdff_net import Architecture
+from lfstereo.network.families import AnyArchitecture, read_architecture
 from lfstereo.options import from_mapping, option, read_toml
-
-STAGES = ("pool", "stereo", "edof", "focus_planes", "focus", "guided", "stereo_stacks", "fusion", "joint")
 
 
 @dataclass(frozen=True, slots=True)
 class Recipe:
     """What one training run does; a TOML file holds it, with an ``[architecture]`` table for the network."""
 
-    stage: Literal["pool", "stereo", "edof", "focus_planes", "focus", "guided", "stereo_stacks", "fusion", "joint"] = (
-        option("stereo", "what is trained; 'pool' only renders the stacks that the other stages read")
+    stage: Literal[
+        "pool",
+        "stereo",
+        "edof",
+        "focus_planes",
+        "focus",
+        "guided",
+        "stereo_stacks",
+        "fusion",
+        "joint",
+        "match",
+        "slices",
+        "fronts",
+        "refine",
+    ] = option(
+        "stereo",
+        "what is trained; 'pool' renders the stacks that other stages read, 'fronts' what 'refine' starts from",
     )
     seed: int = option(1, "decides scenes, order and initial weights")
     steps: int = option(100000, "most steps; a limit in minutes may end the run earlier")
@@ -27,7 +40,12 @@ class Recipe:
     height: int = option(192, "of a sample", "px")
     width: int = option(320, "of a sample", "px")
     textures: int = option(96, "textures in the bank at any time")
+    scenes: Literal["layers", "rooms", "mixed"] = option(
+        "layers", "what is rendered: layers before a background, furnished rooms, or both"
+    )
+    atlas: str = option("", "folder of photographs from which some textures of rooms are cut")
     pool: str = option("", "folder of rendered stack pairs, for the stages that learn from stacks")
+    fronts: str = option("", "folder that the stage 'fronts' filled, for the stage 'refine'")
     pool_size: int = option(600, "stack pairs in the pool")
     source: Literal["auto", "pool", "ring"] = option(
         "auto", "samples from a pool on disk, or from a ring on the training device; auto: a ring on a graphics card"
@@ -43,7 +61,7 @@ class Recipe:
     threads: int = option(2, "processor threads")
 
 
-def read_recipe(path: Path) -> tuple[Recipe, Architecture]:
+def read_recipe(path: Path) -> tuple[Recipe, AnyArchitecture]:
     """Read a recipe file.
 
     Raises
@@ -52,5 +70,5 @@ def read_recipe(path: Path) -> tuple[Recipe, Architecture]:
         If the file cannot be read, an option is unknown, or a value does not fit.
     """
     table = read_toml(path)
-    architecture = from_mapping(Architecture, table.pop("architecture", {}), f"{path} [architecture]")
+    architecture = read_architecture(table.pop("architecture", {}), f"{path} [architecture]")
     return from_mapping(Recipe, table, str(path)), architecture

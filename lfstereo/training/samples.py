@@ -14,7 +14,8 @@ import numpy as np
 from lfstereo.arrays import Bool, Float32, Float64
 from lfstereo.conventions import DISPARITY_RANGE_PX, SLICES_DEFAULT
 from lfstereo.network.encoding import encode, exposure_of
-from lfstereo.training.scenes import Scene, random_scene, render
+from lfstereo.training.rooms import SCENES
+from lfstereo.training.scenes import Scene, render
 
 PUPIL_POINTS = 21
 """Points of each pupil that a stack averages."""
@@ -70,9 +71,14 @@ def pupil_points(count: int, turn_rad: float = 0.0) -> Float32:
     return np.asarray(points - points.mean(0), np.float32)
 
 
-def pair_sample(rng: np.random.Generator, textures: Float32, height: int, width: int) -> PairSample:
-    """Render an all-in-focus pair with the faults of real cameras: noise, blur, unequal exposure, misalignment."""
-    scene = random_scene(rng, textures, height, width)
+def pair_sample(
+    rng: np.random.Generator, textures: Float32, height: int, width: int, kind: str = "layers"
+) -> PairSample:
+    """Render an all-in-focus pair with the faults of real cameras: noise, blur, unequal exposure, misalignment.
+
+    ``kind`` names the scene, see :data:`lfstereo.training.rooms.SCENES`.
+    """
+    scene = SCENES[kind](rng, textures, height, width)
     left, right = render(scene, 0, 0, samples=2), render(scene, 1, 0, samples=2, shift_y=draw_misalignment(rng))
     images = [left.image, right.image * draw_gain(rng)]
     exposure, blur = exposure_of(*images), draw_blur_px(rng)
@@ -88,7 +94,12 @@ def pair_sample(rng: np.random.Generator, textures: Float32, height: int, width:
 
 
 def stack_sample(
-    rng: np.random.Generator, textures: Float32, height: int, width: int, aperture_ratio: float | None = None
+    rng: np.random.Generator,
+    textures: Float32,
+    height: int,
+    width: int,
+    aperture_ratio: float | None = None,
+    kind: str = "layers",
 ) -> StackSample:
     """Render a pair of focal stacks focused at 100 to 0 px.
 
@@ -102,8 +113,10 @@ def stack_sample(
         Size in px.
     aperture_ratio
         Blur diameter per px of disparity; drawn from 0.05 to 0.4, mostly 0.08 to 0.2, where not given.
+    kind
+        Of scene, see :data:`lfstereo.training.rooms.SCENES`.
     """
-    scene = random_scene(rng, textures, height, width)
+    scene = SCENES[kind](rng, textures, height, width)
     ratio = aperture_ratio or draw_aperture_ratio(rng)
     gains, misalignment = (np.ones(3, np.float32), draw_gain(rng)), (0.0, draw_misalignment(rng))
     sharp_views = [render(scene, eye, 0, samples=4, shift_y=misalignment[eye]) for eye in (0, 1)]

@@ -69,10 +69,10 @@ def random_scene(rng: np.random.Generator, textures: Float32, height: int, width
     rows = [_background(rng, far, near, height, width)]
     power = rng.uniform(0.6, 1.8)
     centres = far + (near - far) * rng.random(count) ** power
-    rows.extend(_object(rng, float(d), near, far, height, width) for d in centres)
+    rows.extend(flat_object(rng, float(d), near, far, height, width) for d in centres)
     layers = np.stack(rows).astype(np.float32)
     layers[1:] = layers[1:][np.argsort(layers[1:, Column.D])]
-    _dress(rng, layers, len(textures))
+    dress(rng, layers, len(textures))
     return Scene(layers, textures, height, width)
 
 
@@ -91,7 +91,8 @@ def _background(rng: np.random.Generator, far: float, near: float, height: int, 
     return row
 
 
-def _object(rng: np.random.Generator, d: float, near: float, far: float, height: int, width: int) -> Float64:
+def flat_object(rng: np.random.Generator, d: float, near: float, far: float, height: int, width: int) -> Float64:
+    """Draw a layer at disparity ``d``: a slanted, bulging or rippled sheet of any silhouette, within far to near."""
     row = np.zeros(Column.COUNT)
     shape = rng.choice(5, p=[0.3, 0.25, 0.25, 0.1, 0.1]) + 1
     size = height * (0.05 + 0.4 * rng.random() ** 1.5) * (0.6 + 0.7 * d / 100)
@@ -127,7 +128,8 @@ def _ripple(rng: np.random.Generator, row: Float64, most: float) -> None:
     row[Column.PHASE] = rng.uniform(0, 2 * np.pi)
 
 
-def _dress(rng: np.random.Generator, layers: Float32, bank: int) -> None:
+def dress(rng: np.random.Generator, layers: Float32, bank: int) -> None:
+    """Give every layer a texture of the bank, placed at random, and a colour."""
     count = len(layers)
     layers[:, Column.TEXTURE] = rng.integers(0, bank, count)
     scale, angle = np.exp(rng.uniform(-0.8, 0.4, count)), rng.uniform(0, 2 * np.pi, count)

@@ -5,10 +5,12 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any, Literal
 
 from lfstereo.errors import ConfigError
 from lfstereo.progress import Progress, silent
 from lfstereo.training.batches import Batch, PairBatches, PoolBatches, prefetched
+from lfstereo.training.fronts import FrontBatches
 from lfstereo.training.planes import PlaneBatches
 from lfstereo.training.pool import open_pool
 from lfstereo.training.recipe import Recipe
@@ -18,6 +20,8 @@ from lfstereo.training.workers import Worker
 Rings = dict[tuple[RingSize, int], SampleRing]
 """Rings that are filled already, for the stages that follow in the same process."""
 _RANKS = 7919
+_EYES_READ: dict[str, Literal[0, 1, 2]] = {"match": 0, "edof": 1, "focus": 1, "slices": 1}
+"""Stages that need not read both stacks -> how many they need."""
 
 
 def batches(
@@ -57,15 +61,19 @@ def _ring_source(recipe: Recipe, worker: Worker, rings: Rings, progress: Progres
     return RingBatches(rings[size, seed], seed, recipe.batch, recipe.crop, grain, progress)
 
 
-def _processor_source(recipe: Recipe) -> Callable[[int], Batch]:
-    if recipe.stage == "stereo":
-        return PairBatches(recipe.seed, recipe.batch, recipe.height, recipe.width, recipe.textures)
+def _processor_source(recipe: Recipe) -> Callable[[int], Any]:
+    if recipe.stage == "stereo" or (recipe.stage == "match" and not recipe.pool):
+        return PairBatches(
+            recipe.seed, recipe.batch, recipe.height, recipe.width, recipe.textures, recipe.scenes, recipe.atlas
+        )
     if not recipe.pool:
         raise ConfigError(f"stage {recipe.stage}: no pool is named; render one with stage 'pool' and give its folder")
     pool = open_pool(Path(recipe.pool), recipe.pool_size, recipe.height, recipe.width, recipe.seed)
+    if recipe.stage == "refine":
+        return FrontBatches(pool, recipe)
     if recipe.stage == "focus_planes":
         return PlaneBatches(pool, recipe.seed, recipe.batch, recipe.crop or (recipe.height, recipe.width))
-    return PoolBatches(pool, recipe.seed, recipe.batch, recipe.crop)
+    return PoolBatches(pool, recipe.seed, recipe.batch, recipe.crop, _EYES_READ.get(recipe.stage, 2))
 
 
 def _moved(batch: Batch, worker: Worker) -> Batch:

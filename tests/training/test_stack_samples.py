@@ -72,7 +72,7 @@ def test_stack_is_sharpest_at_its_own_disparity(bank: np.ndarray, monkeypatch: p
     row[[Column.D, Column.TEX_COS]] = SLICE_DISPARITIES[5], 1.0
     row[Column.GAIN : Column.GAIN + 3] = 1.0
     noise = np.random.default_rng(0).random((1, 256, 256, 3), dtype=np.float32)
-    monkeypatch.setattr(samples, "random_scene", lambda *_: Scene(row[None], noise, HEIGHT, WIDTH))
+    monkeypatch.setitem(samples.SCENES, "layers", lambda *_: Scene(row[None], noise, HEIGHT, WIDTH))
     sample = stack_sample(np.random.default_rng(1), noise, HEIGHT, WIDTH, aperture_ratio=0.3)
     for eye in (0, 1):
         lit = sample.valid[eye]
