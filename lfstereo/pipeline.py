@@ -118,15 +118,18 @@ def run_pair(
 
 
 def check_slices(options: RunOptions, network: Network) -> None:
-    """Refuse a number of slices that the network was not made for.
+    """Refuse a number of slices that the network cannot use.
 
     Raises
     ------
     ConfigError
-        If the two differ.
+        If there are too few or too many.
     """
-    wanted = network.module.architecture.slices
-    if options.slices != wanted:
+    from lfstereo.network.estimate import slice_limits
+
+    fewest, most = slice_limits(network.module)
+    if not fewest <= options.slices <= most:
+        wanted = f"{fewest}" if fewest == most else f"{fewest} to {most}"
         raise ConfigError(f"slices = {options.slices}, expected {wanted}, what {options.model} was made for")
 
 

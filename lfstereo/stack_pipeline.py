@@ -258,7 +258,7 @@ def _by_network(
 ) -> tuple[DisparityMap, str]:
     if geometry is None:
         raise ConfigError("network: found no geometry, expected --rig, or --baseline-m and a focal length")
-    from lfstereo.network.estimate import estimate_disparity, load_network
+    from lfstereo.network.estimate import estimate_disparity, load_network, slice_limits
 
     network = load_network(options.model, options.device)
     stacks = []
@@ -266,6 +266,7 @@ def _by_network(
         sweep = aligned.sweep
         focused = geometry.focal_px * geometry.baseline_m * vergence(sweep) - geometry.doffs_px
         ratio = (sweep.lens.aperture_m or 0.0) / geometry.baseline_m
-        count = network.module.architecture.slices
+        fewest, most = slice_limits(network.module)
+        count = min(max(len(slices[side]), fewest), most)
         stacks.append(even_stack(slices[side], focused, ratio, sweep.source, count))
     return estimate_disparity(stacks[0], stacks[1], network), network.card.sha256

@@ -21,7 +21,7 @@ from lfstereo.simulate.virtual_dslr import VirtualDslrOptions
 
 if TYPE_CHECKING:
     from lfstereo.simulate.stack_dataset import DualStack
-    from lfstereo.training.comparison import Row
+    from lfstereo.training.rows import Row
 
 _TITLES = ("MAE/100", "MAE px", "bad 0.5", "bad 1", "bad 2", "bad 4", "density", "PSNR dB", "s")
 
@@ -60,7 +60,8 @@ def run(arguments: argparse.Namespace) -> int:
         check_absent(arguments.output, arguments.force)
     from lfstereo.network.estimate import load_network
     from lfstereo.network.shipped import DEFAULT_MODEL
-    from lfstereo.training.comparison import compare, summarise
+    from lfstereo.training.comparison import compare
+    from lfstereo.training.rows import summarise
 
     total, cases = _cases(arguments, height, width)
     network = None if arguments.no_network else load_network(arguments.model or DEFAULT_MODEL, arguments.device)

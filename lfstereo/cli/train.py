@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from lfstereo.network.bdff_net import Architecture
+    from lfstereo.network.families import AnyArchitecture
     from lfstereo.training.recipe import Recipe
     from lfstereo.training.sources import Rings
     from lfstereo.training.workers import Worker
@@ -76,7 +76,7 @@ def _replaced(recipe: Recipe, arguments: argparse.Namespace, made: list[str]) ->
 
 def _train(
     recipe: Recipe,
-    architecture: Architecture,
+    architecture: AnyArchitecture,
     output: Path,
     minutes: float | None,
     resume: bool,

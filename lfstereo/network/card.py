@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from lfstereo.errors import AssetError, ConfigError
-from lfstereo.network.bdff_net import Architecture
+from lfstereo.network.families import AnyArchitecture, read_architecture
 from lfstereo.options import from_mapping, read_toml, to_toml
 
 LICENCE = "BSD-3-Clause"
@@ -52,7 +52,7 @@ class ModelCard:
     deviations: tuple[str, ...]
     """Where the networks differ from the published description, and why."""
     limits: tuple[str, ...]
-    architecture: Architecture
+    architecture: AnyArchitecture
     training: Training
     metrics: tuple[Metric, ...] = ()
 
@@ -79,9 +79,12 @@ def read_card(path: Path) -> ModelCard:
     """
     try:
         table = read_toml(path)
-        architecture = from_mapping(Architecture, table.pop("architecture", {}), f"{path} [architecture]")
+        architecture = read_architecture(table.pop("architecture", {}), f"{path} [architecture]")
         training = from_mapping(Training, table.pop("training", {}), f"{path} [training]")
-        metrics = tuple(_complete(Metric, m, f"{path} [[metrics]]") for m in table.pop("metrics", []))
+        rows = table.pop("metrics", [])
+        metrics = tuple(
+            _complete(Metric, m, f"{path} [[metrics]]") for m in (rows if isinstance(rows, list) else [rows])
+        )
         tables = {"architecture": architecture, "training": training, "metrics": metrics}
         card: ModelCard = _complete(ModelCard, table, str(path), tables)
     except ConfigError as error:
@@ -89,14 +92,15 @@ def read_card(path: Path) -> ModelCard:
     return card
 
 
-def _complete(cls: type[Any], table: Mapping[str, Any], where: str, given: Mapping[str, Any] | None = None) -> Any:
+def _complete(cls: type[Any], table: Any, where: str, given: Mapping[str, Any] | None = None) -> Any:
+    if not isinstance(table, dict):
+        raise ConfigError(f"{where}: found no table, expected one; take the file from a fresh copy of the model")
     needed = {f.name for f in dataclasses.fields(cls)} - set(given or {})
     if missing := sorted(needed - set(table)):
         raise ConfigError(f"{where}: '{missing[0]}' is missing; take the file from a fresh copy of the model")
     if unknown := sorted(set(table) - needed):
-        raise ConfigError(f"{where}: '{unknown[0]}' is unknown; expected {', '.join(sorted(needed))}")
-    values = {name: tuple(v) if isinstance(v, list) else v for name, v in table.items()}
-    return cls(**values, **(given or {}))
+        raise ConfigError(f"{where}: {unknown[0][:60]!r} is unknown; expected {', '.join(sorted(needed))}")
+    return from_mapping(cls, table, where, given)
 
 
 def _wrapped(text: str) -> str:

@@ -16,15 +16,15 @@ from safetensors.torch import save as serialise
 from torch import Tensor
 
 from lfstereo.errors import AssetError
-from lfstereo.network.bdff_net import BdffNet
 from lfstereo.network.card import ModelCard, read_card, write_card
+from lfstereo.network.families import AnyNetwork, build
 from lfstereo.network.shipped import CARD, WEIGHTS
 from lfstereo.outputs import atomic_folder
 
 _COUNTER = "num_batches_tracked"
 
 
-def save_model(folder: Path, network: BdffNet, card: ModelCard, force: bool = False) -> ModelCard:
+def save_model(folder: Path, network: AnyNetwork, card: ModelCard, force: bool = False) -> ModelCard:
     """Write a model's folder and return the card with the sha256 filled in.
 
     Raises
@@ -49,7 +49,7 @@ def save_model(folder: Path, network: BdffNet, card: ModelCard, force: bool = Fa
     return card
 
 
-def load_model(folder: Path) -> tuple[BdffNet, ModelCard]:
+def load_model(folder: Path) -> tuple[AnyNetwork, ModelCard]:
     """Build the network that a card describes and give it its weights; eval mode, float32, on the processor.
 
     Raises
@@ -68,23 +68,39 @@ def load_model(folder: Path) -> tuple[BdffNet, ModelCard]:
             f"{path}: sha256 is {found[:12]}…, expected {card.sha256[:12]}… from the card; "
             "the file is damaged or from another version, take it from a fresh copy"
         )
-    try:
-        state = {name: value.float() for name, value in parse(payload).items()}
-    except SafetensorError as error:
-        raise AssetError(f"{path}: not a safetensors file ({error}); take it from a fresh copy") from error
-    network = BdffNet(card.architecture)
+    state = parse_weights(payload, path)
+    network = build(card.architecture)
     _fill(network, state, path)
     return network.eval(), card
 
 
-def _fill(network: BdffNet, state: dict[str, Tensor], path: Path) -> None:
+def parse_weights(payload: bytes, path: Path) -> dict[str, Tensor]:
+    """Return the weights of a safetensors file by name, as float32.
+
+    Raises
+    ------
+    AssetError
+        If it is none, or holds something else than real numbers.
+    """
+    try:
+        state = parse(payload)
+    except (SafetensorError, KeyError, RuntimeError, ValueError) as error:
+        reason = (str(error).splitlines() or [type(error).__name__])[0]
+        raise AssetError(f"{path}: not a safetensors file ({reason}); take it from a fresh copy") from error
+    odd = next((name for name, value in state.items() if not value.is_floating_point()), None)
+    if odd is not None:
+        raise AssetError(f"{path}: weight {odd[:60]!r} holds no real numbers; take it from a fresh copy")
+    return {name: value.float() for name, value in state.items()}
+
+
+def _fill(network: AnyNetwork, state: dict[str, Tensor], path: Path) -> None:
     wanted = network.state_dict()
     counters = {name: value for name, value in wanted.items() if name.endswith(_COUNTER)}
     names = set(wanted) - set(counters)
     if odd := sorted(names ^ set(state)):
         verb = "is missing" if odd[0] in names else "is unknown"
         raise AssetError(
-            f"{path}: weight {odd[0]} {verb} ({len(odd)} such in all); card and weights do not belong together"
+            f"{path}: weight {odd[0][:60]!r} {verb} ({len(odd)} such in all); card and weights do not belong together"
         )
     for name in sorted(names):
         if state[name].shape != wanted[name].shape:

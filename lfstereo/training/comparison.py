@@ -2,60 +2,38 @@
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, fields
 from pathlib import Path
 
 import numpy as np
 import torch
-from torch import Tensor, nn
+from torch import nn
 
-from lfstereo.arrays import Bool, Float32, Rgb
 from lfstereo.conventions import DISPARITY_RANGE_PX
-from lfstereo.depth.baselines import fill_from_background, sgbm, sgbm_wls
-from lfstereo.depth.disparity import DisparityMap
-from lfstereo.depth.metrics import score_disparity
+from lfstereo.depth.baselines import sgbm
 from lfstereo.focus.measures import depth_from_focus
+from lfstereo.network.binocular_net import BinocularNet
 from lfstereo.network.encoding import decode, encode, exposure_of
-from lfstereo.network.estimate import Network, check_stacks, network_input
+from lfstereo.network.estimate import Network, binocular_map, check_stacks, cropped, encoded_stack
 from lfstereo.simulate.photograph import PhotographOptions
 from lfstereo.simulate.stack_dataset import DualStack, read_dual_stack
 from lfstereo.simulate.stereo_scenes import SceneFiles, read_scene
 from lfstereo.simulate.synthesis import photograph
 from lfstereo.simulate.virtual_dslr import VirtualDslrOptions
+from lfstereo.training.evaluate import CUES
 from lfstereo.training.generated_dataset import dual_stack_of
+from lfstereo.training.rows import Row, psnr_db, score_row, wls_filled
 from lfstereo.training.samples import stack_sample
 from lfstereo.training.textures import texture_bank
 
 NETWORKS = ("Focus-Net", "Focus-Net-Guided", "Stereo-Net", "BDfF-Net")
 BASELINES = ("SGBM", "SGBM+WLS filled", "depth from focus")
 EDOF = "EDoF-Net"
+SURE = "binocular, sure"
+"""The same, judged where it does not expect an error above 2 px."""
 WLS_ON_EDOF = "SGBM+WLS on EDoF"
 """Classical stereo on the two images of EDoF-Net: it sees no more than the networks do."""
-ALL = "all"
-
-
-@dataclass(frozen=True, slots=True)
-class Row:
-    """What one method got on one scene, or on all; ``None`` where it does not apply."""
-
-    scene: str
-    method: str
-    mae_norm: float | None
-    """Mean absolute error in units of 100 px."""
-    mae_px: float | None
-    bad_05: float | None
-    """Percent of the answered pixels that are off by more than 0.5 px."""
-    bad_1: float | None
-    bad_2: float | None
-    bad_4: float | None
-    density: float | None
-    """Percent of the pixels of known truth that are answered."""
-    seconds: float
-    psnr_db: float | None = None
-    """Of the all-in-focus image against the sharp one, display-referred."""
 
 
 def synthetic_cases(
@@ -99,49 +77,29 @@ def compare(case: DualStack, network: Network | None) -> list[Row]:
     near = float(case.left.disparities_px[0])
     started = time.perf_counter()
     plain = sgbm(case.sharp, case.sharp_right, near)
-    rows.append(_row(case, BASELINES[0], plain.disparity, time.perf_counter() - started, plain.valid))
+    rows.append(score_row(case, BASELINES[0], plain.disparity, time.perf_counter() - started, plain.valid))
     started = time.perf_counter()
-    filled = _wls_filled(case.sharp, case.sharp_right, near)
-    rows.append(_row(case, BASELINES[1], filled.disparity, time.perf_counter() - started, filled.valid))
+    filled = wls_filled(case.sharp, case.sharp_right, near)
+    rows.append(score_row(case, BASELINES[1], filled.disparity, time.perf_counter() - started, filled.valid))
     started = time.perf_counter()
     focused = depth_from_focus(case.left)
-    rows.append(_row(case, BASELINES[2], focused.disparity, time.perf_counter() - started))
+    rows.append(score_row(case, BASELINES[2], focused.disparity, time.perf_counter() - started))
     return rows
 
 
-def summarise(rows: Sequence[Row]) -> list[Row]:
-    """Average every column over the scenes, each scene weighing the same; one row per method.
-
-    Examples
-    --------
-    >>> def one(mae): return Row("a", "SGBM", mae / 100, mae, 1.0, 1.0, 1.0, 1.0, 90.0, 0.5)
-    >>> summarise([one(2.0), one(4.0)])[0].mae_px
-    3.0
-    """
-    numbers = [f.name for f in fields(Row) if f.name not in ("scene", "method")]
-    found = []
-    for method in dict.fromkeys(row.method for row in rows):
-        own = [row for row in rows if row.method == method]
-        columns = {name: [getattr(row, name) for row in own] for name in numbers}
-        means = {n: None if None in values else math.fsum(values) / len(values) for n, values in columns.items()}
-        found.append(Row(ALL, method, **means))  # type: ignore[arg-type]
-    return found
-
-
 def _network_rows(case: DualStack, network: Network) -> list[Row]:
-    architecture = network.module.architecture
-    check_stacks(case.left, case.right, architecture.slices)
+    module = network.module
+    if isinstance(module, BinocularNet):
+        return _binocular_rows(case, network, module)
+    check_stacks(case.left, case.right, network)
     exposure = exposure_of(case.left.slices, case.right.slices)
-    left, right = (
-        network_input(encode(stack.slices, exposure), architecture.multiple).to(network.device)
-        for stack in (case.left, case.right)
-    )
+    left, right = (encoded_stack(stack, exposure, network) for stack in (case.left, case.right))
     foci = case.left.disparities_px
     with torch.inference_mode(), _Clock(network) as clock:
-        found = network.module(left, right, (float(foci[-1]), float(foci[0])))
+        found = module(left, right, (float(foci[-1]), float(foci[0])))
         total = clock.total()
     spent = clock.seconds
-    height, width = case.disparity.shape
+    size = (case.disparity.shape[0], case.disparity.shape[1])
     seconds = {
         NETWORKS[0]: spent["focus"],
         NETWORKS[1]: spent["edof"] / 2 + spent["focus"] + spent["guided"],
@@ -150,58 +108,41 @@ def _network_rows(case: DualStack, network: Network) -> list[Row]:
     }
     maps = dict(zip(NETWORKS, (found.focus, found.guided, found.stereo.final, found.fused), strict=True))
     rows = [
-        _row(case, name, _cropped(tensor, height, width)[0] * np.float32(DISPARITY_RANGE_PX), seconds[name])
+        score_row(case, name, cropped(tensor, size)[0] * np.float32(DISPARITY_RANGE_PX), seconds[name])
         for name, tensor in maps.items()
     ]
     with torch.inference_mode():
-        edof_right = network.module.edof(right)
-    picture, other = (np.moveaxis(_cropped(t, height, width), 0, -1) for t in (found.edof_left, edof_right))
+        edof_right = module.edof(right)
+    picture, other = (np.moveaxis(cropped(t, size), 0, -1) for t in (found.edof_left, edof_right))
     started = time.perf_counter()
-    filled = _wls_filled(decode(picture, 1.0), decode(other, 1.0), float(foci[0]))
+    filled = wls_filled(decode(picture, 1.0), decode(other, 1.0), float(foci[0]))
     seconds[WLS_ON_EDOF] = spent["edof"] + time.perf_counter() - started
-    rows.append(_row(case, WLS_ON_EDOF, filled.disparity, seconds[WLS_ON_EDOF], filled.valid))
+    rows.append(score_row(case, WLS_ON_EDOF, filled.disparity, seconds[WLS_ON_EDOF], filled.valid))
     psnr = psnr_db(picture, encode(case.sharp, exposure), case.known)
     return [*rows, Row(case.name, EDOF, None, None, None, None, None, None, None, spent["edof"] / 2, psnr)]
 
 
-def psnr_db(picture: Float32, truth: Float32, counted: Bool) -> float:
-    """Return the peak signal-to-noise ratio of a picture in 0 to 1, over the counted pixels.
-
-    Examples
-    --------
-    >>> round(psnr_db(np.full((2, 2, 3), 0.6), np.full((2, 2, 3), 0.5), np.ones((2, 2), bool)), 6)
-    20.0
-    """
-    error = float(np.mean((np.clip(picture, 0, 1).astype(np.float64) - truth)[counted] ** 2))
-    return -10 * math.log10(max(error, 1e-12))
-
-
-def _wls_filled(left: Rgb, right: Rgb, d_max: float) -> DisparityMap:
-    """Match and fill; a pair without a single match stays without answers."""
-    found = sgbm_wls(left, right, d_max)
-    return fill_from_background(found) if found.valid.any() else found
-
-
-def _row(case: DualStack, method: str, disparity: Float32, seconds: float, answered: Bool | None = None) -> Row:
-    if answered is not None and not (answered & case.known).any():
-        return Row(case.name, method, None, None, None, None, None, None, 0.0, seconds)
-    scores = score_disparity(np.maximum(disparity, 0), case.disparity, case.known, answered)
-    return Row(
-        scene=case.name,
-        method=method,
-        mae_norm=scores.mae_px / DISPARITY_RANGE_PX,
-        mae_px=scores.mae_px,
-        bad_05=scores.bad_05,
-        bad_1=scores.bad_1,
-        bad_2=scores.bad_2,
-        bad_4=scores.bad_4,
-        density=scores.density,
-        seconds=seconds,
-    )
-
-
-def _cropped(tensor: Tensor, height: int, width: int) -> Float32:
-    return np.asarray(tensor[0, :, :height, :width].float().cpu().numpy(), np.float32)
+def _binocular_rows(case: DualStack, network: Network, module: BinocularNet) -> list[Row]:
+    """Judge the binocular network with both cues, and with either taken away."""
+    check_stacks(case.left, case.right, network)
+    exposure = exposure_of(case.left.slices, case.right.slices)
+    left, right = (encoded_stack(stack, exposure, network) for stack in (case.left, case.right))
+    foci = torch.from_numpy(np.asarray(case.left.disparities_px, np.float32)).to(network.device)
+    size = (case.disparity.shape[0], case.disparity.shape[1])
+    rows: list[Row] = []
+    for name, other, use_focus in zip(CUES, (right, right, None), (True, False, True), strict=True):
+        started = time.perf_counter()
+        with torch.inference_mode():
+            refined, front = module(left, other, foci, use_focus)
+        found = binocular_map(refined, front, size, 1.0)
+        spent = time.perf_counter() - started
+        rows.append(score_row(case, name, found.disparity, spent))
+        if name == CUES[0]:
+            rows.append(score_row(case, SURE, found.disparity, spent, found.valid))
+            picture = encode(found.all_in_focus, 1.0)
+            psnr = psnr_db(picture, encode(case.sharp, exposure), case.known)
+            sharp = Row(case.name, "sharp image", None, None, None, None, None, None, None, spent, psnr)
+    return [*rows, sharp]
 
 
 class _Clock:

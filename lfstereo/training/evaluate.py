@@ -15,15 +15,19 @@ import torch
 from torch import Tensor
 
 from lfstereo.arrays import Bool, Float32
-from lfstereo.network.bdff_net import BdffNet
+from lfstereo.conventions import DISPARITY_RANGE_PX
+from lfstereo.network.binocular_net import BinocularNet
 from lfstereo.network.estimate import load_network
+from lfstereo.network.families import AnyNetwork
 from lfstereo.progress import Progress, progress_bar, silent
-from lfstereo.training.samples import StackSample, stack_sample
+from lfstereo.training.samples import SLICE_DISPARITIES, StackSample, stack_sample
 from lfstereo.training.textures import texture_bank
 
 HELD_OUT_SEED = 900_001
 """Scenes and textures of this seed are never trained on."""
 BAD_PX = (1.0, 2.0, 4.0)
+CUES = ("binocular", "without focus", "without stereo")
+"""What the binocular network is given."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,8 +55,8 @@ def held_out(count: int, height: int, width: int, aperture_ratio: float | None, 
     ]
 
 
-def evaluate(network: BdffNet, samples: Sequence[StackSample], progress: Progress = silent) -> list[Errors]:
-    """Measure focus, guided, stereo and fused maps of the left view, and two references.
+def evaluate(network: AnyNetwork, samples: Sequence[StackSample], progress: Progress = silent) -> list[Errors]:
+    """Measure the maps of the left view that the network's parts make, and two references.
 
     ``constant`` answers the set's median everywhere; ``stereo_visible`` is ``stereo`` without pixels whose match lies
     outside the right image.
@@ -62,16 +66,13 @@ def evaluate(network: BdffNet, samples: Sequence[StackSample], progress: Progres
     network.eval()
     for index, sample in enumerate(samples):
         left, right = (_stack(sample.stacks[eye]) for eye in (0, 1))
-        with torch.inference_mode():
-            found = network(left, right)
         wanted, valid = sample.disparity[0], sample.valid[0]
-        maps = {"focus": found.focus, "guided": found.guided, "stereo": found.stereo.final, "fused": found.fused}
-        if found.stereo.joint is not None:
-            maps["joint"] = found.stereo.joint
-        for part, tensor in maps.items():
-            error = np.abs(tensor[0, 0].numpy() * 100 - wanted)
+        with torch.inference_mode():
+            maps = _maps(network, left, right)
+        for part, disparity in maps.items():
+            error = np.abs(disparity - wanted)
             errors.setdefault(part, []).append(error[valid])
-            if part in ("stereo", "fused"):
+            if part in ("stereo", "fused", *CUES[:2]):
                 errors.setdefault(f"{part}_visible", []).append(error[valid & _in_both(wanted)])
         truth.append(wanted[valid])
         progress(index + 1, len(samples))
@@ -80,16 +81,31 @@ def evaluate(network: BdffNet, samples: Sequence[StackSample], progress: Progres
     return [_errors(part, np.concatenate(parts)) for part, parts in errors.items()]
 
 
-def edof_mae(network: BdffNet, samples: Sequence[StackSample]) -> tuple[float, float]:
+def edof_mae(network: AnyNetwork, samples: Sequence[StackSample]) -> tuple[float, float]:
     """Mean absolute error (0 to 1, display-referred) of EDoF-Net's image, and of the mean slice for comparison."""
     found, plain = [], []
     for sample in samples:
         stack = _stack(sample.stacks[0])
         wanted = torch.from_numpy(sample.sharp[0]).permute(2, 0, 1)[None]
         with torch.inference_mode():
-            found.append(float((network.edof(stack) - wanted).abs().mean()))
+            sharp = network.slices(stack).sharp if isinstance(network, BinocularNet) else network.edof(stack)
+        found.append(float((sharp - wanted).abs().mean()))
         plain.append(float((stack.mean(1) - wanted).abs().mean()))
     return float(np.mean(found)), float(np.mean(plain))
+
+
+def _maps(network: AnyNetwork, left: Tensor, right: Tensor) -> dict[str, Float32]:
+    """Disparity maps in px, ``(H, W)``, by the part that made them."""
+    if isinstance(network, BinocularNet):
+        foci = torch.from_numpy(SLICE_DISPARITIES)
+        given = ((right, True), (right, False), (None, True))
+        found = [network(left, other, foci, use_focus)[0].disparity[0, 0].numpy() for other, use_focus in given]
+        return dict(zip(CUES, found, strict=True))
+    pair = network(left, right)
+    parts = {"focus": pair.focus, "guided": pair.guided, "stereo": pair.stereo.final, "fused": pair.fused}
+    if pair.stereo.joint is not None:
+        parts["joint"] = pair.stereo.joint
+    return {part: tensor[0, 0].numpy() * np.float32(DISPARITY_RANGE_PX) for part, tensor in parts.items()}
 
 
 def _stack(slices: Float32) -> Tensor:

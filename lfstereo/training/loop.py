@@ -18,16 +18,18 @@ from torch import Tensor, nn
 from torch.nn.parallel import DistributedDataParallel
 
 from lfstereo.errors import ConfigError
-from lfstereo.network.bdff_net import Architecture, BdffNet
+from lfstereo.network.binocular_net import BinocularNet
 from lfstereo.network.blocks import channels_last
+from lfstereo.network.families import AnyArchitecture, AnyNetwork, build
 from lfstereo.progress import Progress, silent
 from lfstereo.training.batches import Batch
 from lfstereo.training.checkpoint import Counters, load_checkpoint, read_weights, save_checkpoint
 from lfstereo.training.curve import Curve
+from lfstereo.training.fronts import fill_fronts
 from lfstereo.training.pool import fill_pool, open_pool
 from lfstereo.training.recipe import Recipe
 from lfstereo.training.sources import Rings, batches
-from lfstereo.training.stages import LOSSES, PARTS, select_parts
+from lfstereo.training.stages import LOSSES, select_parts
 from lfstereo.training.workers import Worker
 
 WARM_UP = 0.08
@@ -52,7 +54,7 @@ def one_cycle(fraction: float) -> float:
 
 def train(
     recipe: Recipe,
-    architecture: Architecture,
+    architecture: AnyArchitecture,
     output: Path,
     minutes: float | None = None,
     resume: bool = False,
@@ -92,11 +94,15 @@ def train(
     torch.set_num_threads(recipe.threads)
     if recipe.stage == "pool":
         pool = open_pool(output, recipe.pool_size, recipe.height, recipe.width, recipe.seed)
-        fill_pool(pool, recipe.seed, recipe.textures, progress)
+        fill_pool(pool, recipe.seed, recipe.textures, progress, recipe.scenes, recipe.atlas)
         return Counters("pool", recipe.pool_size, 0.0)
     torch.manual_seed(recipe.seed)
-    network = BdffNet(architecture)
+    network = build(architecture)
     _start_from(network, recipe.start_from)
+    if recipe.stage == "fronts":
+        assert isinstance(network, BinocularNet)
+        fill_fronts(output, recipe, network.eval(), progress)
+        return Counters("fronts", recipe.pool_size, 0.0)
     network.to(worker.device)
     channels_last(network)
     parameters = select_parts(network, recipe.stage)
@@ -114,7 +120,7 @@ def train(
 class StageLoss(nn.Module):
     """The loss of a stage as a module, so that several processes can average its gradients."""
 
-    def __init__(self, network: BdffNet, stage: str, mixed: bool) -> None:
+    def __init__(self, network: AnyNetwork, stage: str, mixed: bool) -> None:
         super().__init__()
         self.network, self.stage, self.mixed = network, stage, mixed
 
@@ -130,7 +136,7 @@ class _Run:
     def __init__(
         self,
         recipe: Recipe,
-        network: BdffNet,
+        network: AnyNetwork,
         optimiser: torch.optim.AdamW,
         output: Path,
         worker: Worker,
@@ -181,12 +187,12 @@ class _Run:
         return loss.detach()
 
 
-def _start_from(network: BdffNet, sources: tuple[str, ...]) -> None:
-    state = network.state_dict()
+def _start_from(network: AnyNetwork, sources: tuple[str, ...]) -> None:
+    state, parts = network.state_dict(), [name for name, _ in network.named_children()]
     for source in sources:
         part, _, folder = source.partition("=")
-        if part not in PARTS or not folder:
-            raise ConfigError(f"start_from: found {source!r}, expected PART=FOLDER with a part of {', '.join(PARTS)}")
+        if part not in parts or not folder:
+            raise ConfigError(f"start_from: found {source!r}, expected PART=FOLDER with a part of {', '.join(parts)}")
         weights = read_weights(Path(folder))
         state.update({name: value for name, value in weights.items() if name.startswith(part + ".")})
     network.load_state_dict(state, strict=True)

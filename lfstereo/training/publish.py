@@ -14,13 +14,13 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from lfstereo.errors import ConfigError
-from lfstereo.network.bdff_net import Architecture, BdffNet, paper_architecture
+from lfstereo.network.bdff_net import Architecture, paper_architecture
 from lfstereo.network.card import LICENCE, Metric, ModelCard, Training
+from lfstereo.network.families import AnyArchitecture, build
 from lfstereo.network.weights import load_model, save_model
 from lfstereo.training.checkpoint import FOLDER, Counters, read_weights
-from lfstereo.training.evaluate import BAD_PX, HELD_OUT_SEED, edof_mae, evaluate, held_out
+from lfstereo.training.evaluate import BAD_PX, CUES, HELD_OUT_SEED, edof_mae, evaluate, held_out
 from lfstereo.training.recipe import read_recipe
-from lfstereo.training.stages import PARTS
 
 DATA = (
     "procedural scenes of slanted and curved textured layers (lfstereo.training.scenes), rendered from seeds; "
@@ -50,7 +50,7 @@ def publish(
     folder: Path,
     stages: Sequence[Path],
     device: str,
-    architecture: Architecture = Architecture(),
+    architecture: AnyArchitecture = Architecture(),
     force: bool = False,
 ) -> ModelCard:
     """Assemble and write a model.
@@ -75,12 +75,13 @@ def publish(
     ConfigError
         If a part has no source, or the folder's name has no version.
     """
-    if missing := [part for part in PARTS if part not in sources]:
-        raise ConfigError(f"publish: no run is given for {missing[0]}, expected {', '.join(PARTS)}")
+    network = build(architecture)
+    parts = [part for part, _ in network.named_children()]
+    if missing := [part for part in parts if part not in sources]:
+        raise ConfigError(f"publish: no run is given for {missing[0]}, expected {', '.join(parts)}")
     name, dash, version = folder.name.rpartition("-v")
     if not dash or not version.isdigit():
         raise ConfigError(f"{folder}: expected a name such as bdffnet-r16-v1, ending in a version")
-    network = BdffNet(architecture)
     state = network.state_dict()
     for part, run in sources.items():
         state.update({key: value for key, value in read_weights(run).items() if key.startswith(part + ".")})
@@ -117,7 +118,7 @@ def measure(folder: Path, count: int, height: int = 192, width: int = 320) -> Mo
     metrics: list[Metric] = []
     for row in evaluate(network, samples):
         metrics.append(Metric(f"{row.part}: mean absolute disparity error", round(row.mae_px, 2), "px", where, command))
-        if row.part in ("stereo", "fused"):
+        if row.part in ("stereo", "fused", CUES[0]):
             shares = zip(BAD_PX, row.bad, strict=True)
             metrics.extend(
                 Metric(f"{row.part}: pixels off by more than {limit:.0f} px", round(100 * bad, 1), "%", where, command)

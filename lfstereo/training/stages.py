@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import torch
 from torch import Tensor
 
 from lfstereo.network.bdff_net import BdffNet
+from lfstereo.network.families import AnyNetwork
 from lfstereo.network.stereo_net import BIN_PX, Prediction
 from lfstereo.training.batches import Batch
+from lfstereo.training.binocular_losses import match_loss, refine_loss, slices_loss
 from lfstereo.training.losses import image_loss, mean_absolute, staged_loss
 
 PARTS = ("edof", "focus", "guided", "stereo", "fusion")
+"""Parts of the published networks."""
 
 TRAINED: dict[str, tuple[str, ...]] = {
     "stereo": ("stereo",),
@@ -23,15 +27,17 @@ TRAINED: dict[str, tuple[str, ...]] = {
     "stereo_stacks": ("stereo",),
     "fusion": ("fusion",),
     "joint": PARTS,
+    "match": ("descriptors",),
+    "slices": ("slices",),
+    "refine": ("refine",),
 }
 """Stage -> parts whose weights it changes; all others are frozen."""
 
 
-def select_parts(network: BdffNet, stage: str) -> list[torch.nn.Parameter]:
+def select_parts(network: AnyNetwork, stage: str) -> list[torch.nn.Parameter]:
     """Put the trained parts into training mode, freeze the others, return the parameters to be trained."""
     chosen: list[torch.nn.Parameter] = []
-    for name in PARTS:
-        part = network.get_submodule(name)
+    for name, part in network.named_children():
         trained = name in TRAINED[stage]
         part.train(trained)
         part.requires_grad_(trained)
@@ -84,7 +90,7 @@ def _joint(network: BdffNet, batch: Batch) -> Tensor:
     return loss + 0.3 * image_loss(found.edof_left, batch.left, batch.valid)
 
 
-LOSSES: dict[str, Callable[[BdffNet, Batch], Tensor]] = {
+LOSSES: dict[str, Callable[[Any, Any], Tensor]] = {
     "stereo": _stereo,
     "edof": _edof,
     "focus_planes": _focus,
@@ -93,5 +99,8 @@ LOSSES: dict[str, Callable[[BdffNet, Batch], Tensor]] = {
     "stereo_stacks": _stereo_stacks,
     "fusion": _fusion,
     "joint": _joint,
+    "match": match_loss,
+    "slices": slices_loss,
+    "refine": refine_loss,
 }
 """Stage -> loss of one batch."""

@@ -110,7 +110,7 @@ def test_missing_weight_in_the_file(copied: Path) -> None:
     save_file(state, copied / WEIGHTS)
     digest = hashlib.sha256((copied / WEIGHTS).read_bytes()).hexdigest()
     rewrite(copied, lambda c: dataclasses.replace(c, sha256=digest))
-    with pytest.raises(AssetError, match=r"edof\.body\.0\.conv\.weight is missing"):
+    with pytest.raises(AssetError, match=r"edof\.body\.0\.conv\.weight' is missing"):
         load_model(copied)
 
 

