@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import os
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
-from typing import TypeVar
 
-import cv2
+import numba
 import numpy as np
 
 from lfstereo.arrays import Bool, Float32, UInt8
@@ -16,10 +14,9 @@ from lfstereo.progress import Progress, silent
 from lfstereo.rig.between_views import view_between
 from lfstereo.rig.geometry import RectifiedGeometry, Side
 from lfstereo.rig.match import check_camera, check_lens
+from lfstereo.rig.resample import resample_view
 from lfstereo.rig.rig import PlenopticCamera, StereoRig
-from lfstereo.rig.view_maps import common_view_baseline_m, view_baseline_m, view_homography, view_map
-
-Picture = TypeVar("Picture", Float32, UInt8)
+from lfstereo.rig.view_maps import common_view_baseline_m, view_baseline_m, view_map
 
 
 def rectify(
@@ -34,9 +31,8 @@ def rectify(
     """Resample one light field of the pair to its rectified camera.
 
     The views of both cameras are read at the same pupil points, so that a disparity has one slope in both. Every view
-    is a pinhole at its pupil point, so it maps by one homography, and by the lens's distortion where the rig has any;
-    the part of the pupil offset that the turn moves out of the plane is exact at ``geometry.reference_m`` and below
-    0.1 px elsewhere.
+    is a pinhole at its pupil point, so it maps by one homography and by the lens's distortion; the part of the pupil
+    offset that the turn moves out of the plane is exact at ``geometry.reference_m`` and below 0.1 px elsewhere.
 
     Parameters
     ----------
@@ -77,43 +73,33 @@ def rectify(
         for s in range(s_count):
             at = t0 + (t - t0) * closer, s0 + (s - s0) * closer
             view, confidence = view_between(light_field, *at)
-            where = (light_field, camera, geometry, side, *at)
-            views[t, s] = _resampled(view, *where, cv2.INTER_CUBIC)
-            weight[t, s] = _resampled(confidence, *where, cv2.INTER_LINEAR)
+            _resample(view, confidence, (light_field, camera, geometry, side, *at), views[t, s], weight[t, s])
 
-    with ThreadPoolExecutor(max_workers=os.cpu_count() or 1) as pool:
+    # As many at once as compiled code may use threads: a worker of a batch has its share of the processor.
+    with ThreadPoolExecutor(max_workers=numba.get_num_threads()) as pool:
         for done, _ in enumerate(pool.map(fill, range(t_count))):
             progress(done + 1, t_count)
-    np.maximum(views, 0.0, out=views)
     return replace(light_field, views=views, weight=weight, sampling=None)
 
 
 def field_of_view(light_field: LightField, camera: PlenopticCamera, geometry: RectifiedGeometry, side: Side) -> Bool:
     """Return where the rectified centre view ``(V, U)`` was seen by the camera at all."""
-    t0, s0 = light_field.centre
-    whole = np.full(light_field.views.shape[2:4], 255, np.uint8)
-    mask: Bool = _resampled(whole, light_field, camera, geometry, side, t0, s0, cv2.INTER_LINEAR) == 255
+    rows, columns = light_field.views.shape[2:4]
+    whole = np.full((rows, columns), 255, np.uint8)
+    nothing, seen = np.zeros((rows, columns, 3), np.float32), np.zeros(geometry.size, np.uint8)
+    where = (light_field, camera, geometry, side, *light_field.centre)
+    _resample(nothing, whole, where, np.empty((*geometry.size, 3), np.float32), seen)
+    mask: Bool = seen == 255
     return mask
 
 
-def _resampled(
-    picture: Picture,
-    light_field: LightField,
-    camera: PlenopticCamera,
-    geometry: RectifiedGeometry,
-    side: Side,
-    t: float,
-    s: float,
-    interpolation: int,
-) -> Picture:
-    """Return a picture of decoded view ``(t, s)`` in rectified px; zero beyond the captured field, or its border."""
-    border = cv2.BORDER_CONSTANT if interpolation == cv2.INTER_LINEAR else cv2.BORDER_REPLICATE
-    result: Picture
-    if any(camera.distortion[:3]):
-        x, y = view_map(light_field, camera, geometry, side, t, s)
-        result = cv2.remap(picture, x, y, interpolation, borderMode=border)
-    else:
-        source = view_homography(light_field, camera, geometry, side, t, s)
-        flags = interpolation | cv2.WARP_INVERSE_MAP
-        result = cv2.warpPerspective(picture, source, geometry.size[::-1], flags=flags, borderMode=border)
-    return result
+def _resample(
+    view: Float32,
+    weight: UInt8,
+    where: tuple[LightField, PlenopticCamera, RectifiedGeometry, Side, float, float],
+    out: Float32,
+    out_weight: UInt8,
+) -> None:
+    found = view_map(*where)
+    maps = (found.picture_from_rectified, found.bend, found.view_from_picture)
+    resample_view(np.ascontiguousarray(view), np.ascontiguousarray(weight), *maps, out, out_weight)

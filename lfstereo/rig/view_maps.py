@@ -3,17 +3,30 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
-from lfstereo.arrays import Float32, Float64
+from lfstereo.arrays import Float64
 from lfstereo.lightfield.field import LightField, ViewSampling
-from lfstereo.rig.distortion import distort, undistort
+from lfstereo.rig.distortion import undistort
 from lfstereo.rig.geometry import RectifiedGeometry, Side
 from lfstereo.rig.rig import PlenopticCamera, StereoRig
 
 VIEW_PIXELS = ViewSampling(origin_px=(0.0, 0.0), step_px=(1.0, 1.0), rotation_rad=0.0, view_step_px=1.0)
 """Of views that never were a lenslet image: px of the sensor are px of the views."""
+
+
+@dataclass(frozen=True, slots=True)
+class ViewMap:
+    """Where one view sees the px of its rectified camera, in three steps."""
+
+    picture_from_rectified: Float64
+    """``(3, 3)`` homography to the lens's ideal picture, tangents."""
+    bend: Float64
+    """``(5,)`` of :func:`lfstereo.rig.distortion.distort`: to the picture as the lens bends it."""
+    view_from_picture: Float64
+    """``(3, 3)`` affine map to px of the view."""
 
 
 def view_baseline_m(light_field: LightField, camera: PlenopticCamera) -> float:
@@ -39,37 +52,18 @@ def sensor_from_view(light_field: LightField) -> Float64:
     )
 
 
-def view_homography(
-    light_field: LightField, camera: PlenopticCamera, geometry: RectifiedGeometry, side: Side, t: float, s: float
-) -> Float64:
-    """Return the ``(3, 3)`` map from rectified px to px of decoded view ``(t, s)``, of a lens without distortion.
-
-    ``t`` and ``s`` may lie between two views.
-    """
-    pupil = _pupil_point(light_field, camera, t, s)
-    homography: Float64 = (
-        np.linalg.inv(sensor_from_view(light_field))
-        @ _sensor_from_direction(camera, pupil)
-        @ _direction_from_rectified(geometry, side, pupil)
-    )
-    homography /= homography[2, 2]
-    return homography
-
-
 def view_map(
     light_field: LightField, camera: PlenopticCamera, geometry: RectifiedGeometry, side: Side, t: float, s: float
-) -> tuple[Float32, Float32]:
-    """Return where in decoded view ``(t, s)`` each rectified px lies: x and y, ``(V, U)`` px; with distortion."""
-    pupil = _pupil_point(light_field, camera, t, s)
-    rows, columns = geometry.size
-    row, column = np.mgrid[:rows, :columns].astype(np.float64)
-    m = _direction_from_rectified(geometry, side, pupil)
-    depth = m[2, 0] * column + m[2, 1] * row + m[2, 2]
-    ideal = [(m[k, 0] * column + m[k, 1] * row + m[k, 2]) / depth for k in (0, 1)]
-    bent = distort(ideal[0], ideal[1], np.asarray(camera.distortion))
-    m = np.linalg.inv(sensor_from_view(light_field)) @ _sensor_from_direction(camera, pupil)
-    x, y = (m[k, 0] * bent.x + m[k, 1] * bent.y + m[k, 2] for k in (0, 1))
-    return x.astype(np.float32), y.astype(np.float32)
+) -> ViewMap:
+    """Return where decoded view ``(t, s)`` sees the rectified px; ``t`` and ``s`` may lie between two views."""
+    t0, s0 = light_field.centre
+    step = view_baseline_m(light_field, camera)
+    pupil = np.array([(s - s0) * step, (t - t0) * step, 0.0])
+    return ViewMap(
+        picture_from_rectified=_picture_from_rectified(geometry, side, camera, pupil),
+        bend=np.asarray(camera.distortion),
+        view_from_picture=np.linalg.inv(sensor_from_view(light_field)) @ _sensor_from_picture(camera),
+    )
 
 
 def rectify_places(
@@ -84,22 +78,20 @@ def rectify_places(
     """
     pupil = np.array([*(camera.pupil_m_per_px * offset_px), 0.0])
     ones = np.ones((len(places), 1))
-    bent = np.hstack([places, ones]) @ np.linalg.inv(_sensor_from_direction(camera, pupil)).T
+    bent = np.hstack([places, ones]) @ np.linalg.inv(_sensor_from_picture(camera)).T
     ideal = np.stack(undistort(bent[:, 0], bent[:, 1], np.asarray(camera.distortion)), axis=1)
-    seen = np.hstack([ideal, ones]) @ np.linalg.inv(_direction_from_rectified(geometry, side, pupil)).T
+    seen = np.hstack([ideal, ones]) @ np.linalg.inv(_picture_from_rectified(geometry, side, camera, pupil)).T
     rectified: Float64 = seen[:, :2] / seen[:, 2:]
     return rectified
 
 
-def _pupil_point(light_field: LightField, camera: PlenopticCamera, t: float, s: float) -> Float64:
-    """Return the pupil point of a view in camera axes, ``(3,)`` m."""
-    t0, s0 = light_field.centre
-    step = view_baseline_m(light_field, camera)
-    return np.array([(s - s0) * step, (t - t0) * step, 0.0])
+def _picture_from_rectified(
+    geometry: RectifiedGeometry, side: Side, camera: PlenopticCamera, pupil: Float64
+) -> Float64:
+    """Return the ``(3, 3)`` map from rectified px to the lens's ideal picture ``(X - pupil)/Z + pupil/Zf``.
 
-
-def _direction_from_rectified(geometry: RectifiedGeometry, side: Side, pupil: Float64) -> Float64:
-    """Return the ``(3, 3)`` map from rectified px to the ideal direction ``(X - pupil)/Z`` from a pupil point."""
+    That is the direction in which the pupil's centre sees the point of the plane of zero slope on the same ray.
+    """
     target = geometry.camera(side)
     f, z0, zr = geometry.focal_px, geometry.zero_slope_m, geometry.reference_m
     inverse_f = 1 / f
@@ -115,19 +107,14 @@ def _direction_from_rectified(geometry: RectifiedGeometry, side: Side, pupil: Fl
     # X_camera - pupil, linear in the homogeneous plane point because its z is the constant zr.
     shift = np.zeros((3, 3))
     shift[:, 2] = -pupil / zr
-    in_camera = camera_from_rectified @ plane_from_px
-    direction: Float64 = in_camera + shift @ plane_from_px
-    return direction
+    direction = (camera_from_rectified + shift) @ plane_from_px
+    lean = np.eye(3)
+    lean[:2, 2] = pupil[:2] / camera.focus_distance_m
+    picture: Float64 = lean @ direction
+    return picture
 
 
-def _sensor_from_direction(camera: PlenopticCamera, pupil: Float64) -> Float64:
-    """Return the ``(3, 3)`` map from bent direction to sensor px of the lattice, as seen from a pupil point."""
-    fx, fy = camera.focal_px
-    zf = camera.focus_distance_m
-    return np.array(
-        [
-            [fx, 0, camera.principal_px[0] + fx * pupil[0] / zf],
-            [0, fy, camera.principal_px[1] + fy * pupil[1] / zf],
-            [0, 0, 1],
-        ]
-    )
+def _sensor_from_picture(camera: PlenopticCamera) -> Float64:
+    """Return the ``(3, 3)`` map from the picture as the lens bends it to sensor px of the lattice."""
+    (fx, fy), (cx, cy) = camera.focal_px, camera.principal_px
+    return np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]])

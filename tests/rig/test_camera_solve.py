@@ -31,12 +31,13 @@ def test_a_point_lies_on_the_ray_of_the_pixel_it_is_projected_to() -> None:
     assert ray_distance_m(RAYS, offset, place, points).max() < 1e-9
 
 
-def test_derivatives_of_the_projection() -> None:
+@pytest.mark.parametrize("stigmatic", [False, True])
+def test_derivatives_of_the_projection(stigmatic: bool) -> None:
     offset, points = some_points()
-    seen = project(RAYS, offset, points, np.zeros((6, 2)))
+    seen = project(RAYS, offset, points, np.zeros((6, 2)), stigmatic)
 
     def place(rays: np.ndarray, at: np.ndarray) -> np.ndarray:
-        return project(rays, offset, at, seen.place).place
+        return project(rays, offset, at, seen.place, stigmatic).place
 
     for number in range(RAY):
         step = np.zeros(RAY)
@@ -75,6 +76,21 @@ def test_the_lens_camera_projects_as_its_formula_says() -> None:
     place = project(rays, np.array([[i, j]]), np.array([[x, y, z]]), np.zeros((1, 2))).place[0]
     expected = [fx * (x / z - i * m * (1 / z - 1 / zf)) + cx, fy * (y / z - j * m * (1 / z - 1 / zf)) + cy]
     np.testing.assert_allclose(place, expected, rtol=0, atol=1e-8)
+
+
+def test_rays_through_one_micro_image_of_a_stigmatic_lens_meet() -> None:
+    zf, m = 0.85, 7e-4
+    rays, _ = plenoptic_rays(np.array([14630.0, 14630.0, 3860.0, 2690.0, 1 / zf, m, -0.12, 0.2, 0, 0.01, -0.005]))
+    on_plane = np.array([[0.2, -0.13, zf]])
+    offset = np.array([[0.0, 0.0], [6.0, -5.0]])
+    # A point of the plane of zero slope, and one farther out on the ray that it sends through the pupil point (i, j).
+    pupil = np.column_stack([m * offset, [0.0, 0.0]])
+    farther = pupil + 1.3 * (on_plane - pupil)
+    for points in (np.repeat(on_plane, 2, axis=0), farther):
+        places = project(rays, offset, points, np.zeros((2, 2)), stigmatic=True).place
+        np.testing.assert_allclose(places[1], places[0], rtol=0, atol=1e-8)
+    bent = project(rays, offset, farther, np.zeros((2, 2))).place
+    assert np.hypot(*(bent[1] - bent[0])) > 1.0  # Directions bent each by itself do not meet.
 
 
 def test_undistorting_takes_the_distortion_out() -> None:

@@ -13,7 +13,7 @@ from lfstereo.lightfield.field import LightField, ViewSampling
 from lfstereo.rig.geometry import RectifiedGeometry, Side, rectified_geometry
 from lfstereo.rig.rectify import rectify
 from lfstereo.rig.rig import PlenopticCamera, SensorGrid, StereoRig
-from lfstereo.rig.view_maps import common_view_baseline_m, view_baseline_m, view_homography
+from lfstereo.rig.view_maps import common_view_baseline_m, view_baseline_m, view_map
 
 VIEWS = 5
 VIEW_STEP_PX = 2.0
@@ -74,8 +74,8 @@ def rectified_px(
     step = view_baseline_m(light_field, camera)
     t0, s0 = light_field.centre
     view_px = seen_at(camera, light_field.sampling, in_camera, (s - s0) * step, (t - t0) * step)
-    homography = view_homography(light_field, camera, geometry, side, t, s)
-    x, y, w = np.linalg.solve(homography, [*view_px, 1.0])
+    found = view_map(light_field, camera, geometry, side, t, s)
+    x, y, w = np.linalg.solve(found.view_from_picture @ found.picture_from_rectified, [*view_px, 1.0])
     return np.array([x, y]) / w
 
 
