@@ -19,14 +19,17 @@ from scipy.spatial.transform import Rotation
 
 from lfstereo.arrays import Float64
 from lfstereo.cli.main import main as lfstereo
+from lfstereo.options import from_mapping, read_toml
 from lfstereo.rig.bundle import RigSolution, solve_rig
 from lfstereo.rig.geometry import Side, rectified_geometry
-from lfstereo.rig.intrinsics import plenoptic_rays, project
-from lfstereo.rig.rig import PlenopticCamera, StereoRig, read_rig
+from lfstereo.rig.rig import StereoRig
 from lfstereo.rig.session import Session, see_targets
 from lfstereo.rig.shots import pair_shots
 from lfstereo.rig.target import Target, read_target
 from lfstereo.rig.view_maps import rectify_places
+from lfstereo.simulate.corners import seen_places
+from lfstereo.simulate.options import SimulateOptions
+from lfstereo.simulate.rigs import SimulatedRig, build_rig
 
 SIDES: tuple[Side, Side] = ("left", "right")
 BOARDS, DISTORTION_K1 = 12, -0.1
@@ -35,23 +38,15 @@ TARGETS = {"baseline": 0.2, "rotation": 0.02, "rows": 0.1, "depth": 0.5, "deviat
 NEAR_1M = (0.93, 1.07)
 
 
-def seen_at(camera: PlenopticCamera, points: Float64, offset_px: Float64) -> Float64:
-    """Return where a true camera sees points ``(N, 3)`` from one place of its pupil, sensor px."""
-    lens = [1 / camera.focus_distance_m, camera.pupil_m_per_px]
-    rays, _ = plenoptic_rays(np.array([*camera.focal_px, *camera.principal_px, *lens, *camera.distortion]))
-    offsets = np.broadcast_to(offset_px, (len(points), 2))
-    return project(rays, offsets, points, np.zeros((len(points), 2))).place
-
-
-def row_parallax_px(truth: StereoRig, found: StereoRig) -> tuple[float, float]:
+def row_parallax_px(simulated: SimulatedRig, found: StereoRig) -> tuple[float, float]:
     """Return rms and largest difference of rows, right minus left, over the frame, the range and all views, px."""
-    geometry = rectified_geometry(found)
+    geometry, truth = rectified_geometry(found), simulated.stereo
     rng = np.random.default_rng(0)
     z = 1 / rng.uniform(1 / truth.far_m, 1 / truth.near_m, 400)
     place = rng.uniform(0, 1, (400, 2)) * truth.left.sensor_px
     points = np.column_stack([(place - truth.left.principal_px) / truth.left.focal_px * z[:, None], z])
     in_right = points @ truth.right_from_left.T + truth.translation_m
-    at_centre = seen_at(truth.right, in_right, np.zeros(2))
+    at_centre = seen_places(simulated.right, in_right, np.zeros((1, 2)))[0]
     common = np.all((at_centre > 0) & (at_centre < truth.right.sensor_px), axis=1)
     closest = min(found.left.pupil_m_per_px, found.right.pupil_m_per_px)
     misses = []
@@ -61,9 +56,10 @@ def row_parallax_px(truth: StereoRig, found: StereoRig) -> tuple[float, float]:
             continue  # Beyond the round aperture.
         rows = []
         for side, seen in (("left", points[common]), ("right", in_right[common])):
-            camera, true = getattr(found, side), getattr(truth, side)
+            camera = getattr(found, side)
             offset = steps * closest / camera.pupil_m_per_px
-            rows.append(rectify_places(seen_at(true, seen, offset), offset, camera, geometry, side)[:, 1])
+            places = seen_places(getattr(simulated, side), seen, offset[None])[0]
+            rows.append(rectify_places(places, offset, camera, geometry, side)[:, 1])
         misses.append(rows[1] - rows[0])
     miss = np.concatenate(misses)
     return float(np.sqrt(np.mean(miss**2))), float(np.abs(miss).max())
@@ -89,16 +85,18 @@ def corner_depths(folder: Path, target: Target, solution: RigSolution) -> tuple[
     return np.concatenate(true), np.concatenate(found)
 
 
-def report(folder: Path, session: Session, target: Target, solution: RigSolution, truth: StereoRig) -> None:
+def report(folder: Path, session: Session, target: Target, solution: RigSolution) -> None:
     """Print each figure beside its target."""
-    rig = solution.rig
+    table = read_toml(folder / "simulation.toml")["simulate"]
+    simulated = build_rig(from_mapping(SimulateOptions, table, "simulation.toml"))
+    rig, truth = solution.rig, simulated.stereo
     turn = Rotation.from_matrix(rig.right_from_left @ truth.right_from_left.T)
     baseline = rig.baseline_m - truth.baseline_m
     focal = [getattr(rig, side).focal_px[0] / getattr(truth, side).focal_px[0] - 1 for side in SIDES]
     deviations = np.array([baseline / solution.baseline_sd_m, *(turn.as_rotvec() / solution.rotation_sd_rad)])
     deviations = np.abs(np.concatenate([deviations, np.array(focal) / solution.focal_sd]))
-    rows, most = row_parallax_px(truth, rig)
-    floor, _ = row_parallax_px(truth, truth)
+    rows, most = row_parallax_px(simulated, rig)
+    floor, _ = row_parallax_px(simulated, truth)
     true, found = corner_depths(folder, target, solution)
     near = (true > NEAR_1M[0]) & (true < NEAR_1M[1])
     error = np.abs(found / true - 1)[near]
@@ -146,7 +144,7 @@ def main() -> None:
         solved = time.process_time() - cpu
         print(f"{len(session.pairs)} shots: captures and corners {seen_cpu:.0f} CPU s ({seen:.0f} s), ", end="")
         print(f"adjustment {solved:.1f} CPU s; rejected: {list(solution.rejected)}")
-        report(folder, session, target, solution, read_rig(folder / "rig.toml"))
+        report(folder, session, target, solution)
 
 
 if __name__ == "__main__":

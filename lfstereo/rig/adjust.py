@@ -13,14 +13,12 @@ from lfstereo.arrays import Bool, Float64
 from lfstereo.progress import Progress, silent
 from lfstereo.rig.intrinsics import Expand, project
 from lfstereo.rig.sightings import Sightings
+from lfstereo.rig.uncertainty import jackknife_covariance, without_pose
 
 _CLIP_SIGMAS = 3.0
 _MEDIAN_OF_NORM = 1.1774
 """Median length of a 2-D Gaussian residual in standard deviations, sqrt(2 ln 2)."""
 _MAX_STEPS = 60
-_BLOCKS = 4
-"""What is wrong with a corner is partly wrong with its neighbours too: residuals count as independent between this many
-parts of the board along both directions, not within."""
 _SMALL_GAIN = 1e-3
 """Of the cost in variances: a step that gains less moves no unknown by a twentieth of its standard deviation."""
 
@@ -40,6 +38,8 @@ class LensModel:
     """``(n,)`` least value of each parameter; ``-inf`` = any."""
     high: Float64
     """``(n,)`` largest value; ``inf`` = any."""
+    stigmatic: bool = False
+    """Distortion moves the picture, not the directions; see :func:`lfstereo.rig.intrinsics.project`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,8 +72,8 @@ class Adjustment:
 
     state: BundleState
     covariance: Float64
-    """Of the free parameters: cameras in turn, rig (rotation about its own axes in rad, translation in m), then six
-    numbers per pose. Robust against residuals that are alike in all views and in one part of the board."""
+    """Of the free parameters: cameras in turn, then the rig (rotation about its own axes in rad, translation in m);
+    whatever the residuals of one shot have in common."""
     sigma_px: float
     """Robust standard deviation of a residual coordinate."""
     residuals: tuple[Float64, ...]
@@ -146,8 +146,7 @@ def adjust(
     References
     ----------
     Triggs, McLauchlan, Hartley and Fitzgibbon, "Bundle adjustment - a modern synthesis" (2000); Huber, "Robust
-    estimation of a location parameter" (1964); Liang and Zeger, "Longitudinal data analysis using generalized
-    linear models" (1986), the covariance with clusters (equation 7).
+    estimation of a location parameter" (1964).
     """
     problem = _Problem(tuple(models), points, tuple(seen), len(start.rotations))
     state, steps = start, 0
@@ -177,11 +176,12 @@ def points_in_camera(state: BundleState, points: Float64, camera: int, pose: int
 
 def _residual(problem: _Problem, state: BundleState, seen: Seen) -> Float64:
     shot = seen.sightings
-    rays, _ = problem.models[seen.camera].expand(state.cameras[seen.camera])
+    model = problem.models[seen.camera]
+    rays, _ = model.expand(state.cameras[seen.camera])
     points = points_in_camera(state, problem.points, seen.camera, seen.pose)[shot.corner]
     if points[:, 2].min() <= 0:
         return np.full_like(shot.place, 1e6)
-    residual: Float64 = project(rays, shot.offset, points, shot.place).place - shot.place
+    residual: Float64 = project(rays, shot.offset, points, shot.place, model.stigmatic).place - shot.place
     return residual
 
 
@@ -206,7 +206,7 @@ def _descend(
     cost, damping = _cost(problem, state, clip), 1e-4
     for step in range(_MAX_STEPS - done):
         progress(min(done + step, _MAX_STEPS), _MAX_STEPS)
-        normal, gradient, _ = _normal_equations(problem, state, clip)
+        normal, gradient = _normal_equations(problem, state, clip)
         scale = np.sqrt(np.diag(normal))
         scale[scale == 0] = 1.0  # The centre of distortion, as long as there is none.
         normal, gradient = normal / np.outer(scale, scale), gradient / scale
@@ -224,43 +224,28 @@ def _descend(
     return state, max(_MAX_STEPS - done, 0)
 
 
-def _normal_equations(
-    problem: _Problem, state: BundleState, clip: float, meat: Float64 | None = None
-) -> tuple[Float64, Float64, int]:
-    """Return ``J'WJ`` and ``J'Wr``, with what was expected; add the squares of each part's scores to ``meat``."""
+def _normal_equations(problem: _Problem, state: BundleState, clip: float) -> tuple[Float64, Float64]:
+    """Return ``J'WJ`` and ``J'Wr``, with what was expected."""
     size = problem.shared + 6 * problem.poses
-    normal, gradient, clusters = np.zeros((size, size)), np.zeros(size), 0
+    normal, gradient = np.zeros((size, size)), np.zeros(size)
     away, weight = problem.surprise(state)
     own = np.arange(len(away))
     normal[own, own] += (clip / _CLIP_SIGMAS) ** 2 * weight
-    if meat is not None:
-        views = np.divide(weight, problem.precision, out=np.zeros_like(weight), where=problem.precision > 0)
-        meat[own, own] += (clip / _CLIP_SIGMAS) ** 4 * weight * views
     gradient[own] += (clip / _CLIP_SIGMAS) ** 2 * weight * away
     for seen in problem.seen:
-        shot = seen.sightings
-        residual, jacobian = _derivatives(problem, state, seen)
-        trust = shot.weight * np.minimum(1.0, clip / np.maximum(np.hypot(*residual.T), 1e-300))
-        weighted = jacobian * trust[:, None, None]
         columns = problem.columns(seen)
-        # Not matmul: threads of a linear algebra library stall each other on matrices this thin.
-        normal[np.ix_(columns, columns)] += np.einsum("mac,mad->cd", weighted, jacobian)
-        gradient[columns] += np.einsum("mac,ma->c", weighted, residual)
-        if meat is not None:
-            scores = np.zeros((_BLOCKS**2, len(columns)))
-            block = _blocks(problem.points)[shot.corner]
-            np.add.at(scores, block, np.einsum("mac,ma->mc", weighted, residual))
-            meat[np.ix_(columns, columns)] += scores.T @ scores
-            clusters += len(np.unique(block[shot.weight > 0]))
-    return normal, gradient, clusters
+        own_normal, own_gradient = _equations_of(problem, state, clip, seen)
+        normal[np.ix_(columns, columns)] += own_normal
+        gradient[columns] += own_gradient
+    return normal, gradient
 
 
-def _blocks(points: Float64) -> np.ndarray[tuple[int], np.dtype[np.intp]]:
-    """Return which part of the board each corner belongs to, ``(N,)``."""
-    low, high = points[:, :2].min(axis=0), points[:, :2].max(axis=0)
-    column, row = np.minimum((points[:, :2] - low) / (high - low) * _BLOCKS, _BLOCKS - 1).astype(np.intp).T
-    block: np.ndarray[tuple[int], np.dtype[np.intp]] = row * _BLOCKS + column
-    return block
+def _equations_of(problem: _Problem, state: BundleState, clip: float, seen: Seen) -> tuple[Float64, Float64]:
+    residual, jacobian = _derivatives(problem, state, seen)
+    trust = seen.sightings.weight * np.minimum(1.0, clip / np.maximum(np.hypot(*residual.T), 1e-300))
+    weighted = jacobian * trust[:, None, None]
+    # Not matmul: threads of a linear algebra library stall each other on matrices this thin.
+    return np.einsum("mac,mad->cd", weighted, jacobian), np.einsum("mac,ma->c", weighted, residual)
 
 
 def _derivatives(problem: _Problem, state: BundleState, seen: Seen) -> tuple[Float64, Float64]:
@@ -275,7 +260,7 @@ def _derivatives(problem: _Problem, state: BundleState, seen: Seen) -> tuple[Flo
         points = swung + state.rig_translation
         by_rig = np.concatenate([-_cross(swung), np.broadcast_to(np.eye(3), (len(turned), 3, 3))], axis=2)
         by_pose = np.concatenate([by_rig, state.rig_rotation @ by_pose], axis=2)
-    seen_at = project(rays, shot.offset, points[shot.corner], shot.place)
+    seen_at = project(rays, shot.offset, points[shot.corner], shot.place, model.stigmatic)
     by_camera = seen_at.by_ray @ by_parameter[:, model.free]
     jacobian = np.concatenate([by_camera, seen_at.by_point @ by_pose[shot.corner]], axis=2)
     return seen_at.place - shot.place, jacobian
@@ -311,11 +296,20 @@ def _moved(problem: _Problem, state: BundleState, delta: Float64) -> BundleState
 
 
 def _covariance(problem: _Problem, state: BundleState, clip: float) -> Float64:
-    size = problem.shared + 6 * problem.poses
-    meat = np.zeros((size, size))
-    normal, _, clusters = _normal_equations(problem, state, clip, meat)
-    scale = np.sqrt(np.diag(normal))
-    bread = np.linalg.pinv(normal / np.outer(scale, scale), hermitian=True) / np.outer(scale, scale)
-    correction = clusters / max(clusters - size / 2, 1.0)
-    covariance: Float64 = bread @ meat @ bread * correction
-    return covariance
+    shared = problem.shared
+    size = shared + 6
+    normals, gradients = np.zeros((problem.poses, size, size)), np.zeros((problem.poses, size))
+    for seen in problem.seen:
+        columns = problem.columns(seen)
+        columns = np.where(columns < shared, columns, columns - 6 * seen.pose)
+        normal, gradient = _equations_of(problem, state, clip, seen)
+        normals[seen.pose][np.ix_(columns, columns)] += normal
+        gradients[seen.pose][columns] += gradient
+    _, weight = problem.surprise(state)
+    precision = problem.precision
+    views = np.divide(weight, precision, out=np.zeros_like(weight), where=precision > 0)
+    expected, scores = np.zeros(shared), np.zeros(shared)
+    expected[: len(weight)] = (clip / _CLIP_SIGMAS) ** 2 * weight
+    scores[: len(weight)] = (clip / _CLIP_SIGMAS) ** 4 * weight * views
+    shots = [without_pose(*equations, shared) for equations in zip(normals, gradients, strict=True)]
+    return jackknife_covariance(shots, expected, scores)

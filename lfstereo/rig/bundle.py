@@ -169,7 +169,7 @@ def _models(
             for side, values in enumerate((low, high)):
                 values[:2], values[5] = bound.focal_px[side], bound.pupil_m_per_px[side]
                 values[4] = bound.vergence_per_m[side]
-        models.append(LensModel(plenoptic_rays, free, expected, sd, low, high))
+        models.append(LensModel(plenoptic_rays, free, expected, sd, low, high, stigmatic=True))
     return models[0], models[1]
 
 

