@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from typing import Any, TypeAlias
 
-from lfstereo.container.fields import Json
+from lfstereo.container.fields import LARGEST, Json
 from lfstereo.container.format import Container, Section
 from lfstereo.container.metadata import frame_entries
 from lfstereo.errors import ContainerError
@@ -18,6 +19,7 @@ _NAMES = {
 }
 _MAPS = {"depthMap": "depth map", "confidenceMap": "confidence map"}
 _FLOAT_BYTES = 4
+_LONGEST_KEY = 60
 _JPEG_SIZE_MARKERS = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
 
 
@@ -31,6 +33,8 @@ class Reference:
     """``sha1-`` and 40 hexadecimal digits."""
     owner: Json
     """The object that holds the reference."""
+    around: Json
+    """The object that holds that one; empty at the top."""
 
     @property
     def key(self) -> str:
@@ -46,8 +50,8 @@ class Reference:
 def references(toc: Json) -> tuple[Reference, ...]:
     """Return all references of a table of contents in its own order."""
     return tuple(
-        Reference(f"{path}.{key}" if path else key, name, owner)
-        for path, owner in _objects(toc)
+        Reference(f"{path}.{key}" if path else key, name, owner, around)
+        for path, owner, around in _objects(toc)
         for key, name in owner.items()
         if key.endswith("Ref") and isinstance(name, str) and name.lower().startswith("sha1-")
     )
@@ -97,7 +101,7 @@ def processed_picture(container: Container) -> str:
     kinds = sorted({_word(str(item.get("kind", item.get("type", "unknown"))).rpartition(".")[2]) for item in items})
     known, objects = references(container.toc), _objects(container.toc)
     stack = [r for r in known if r.parent in ("perImage", "imageArray") and container.find(r.name)]
-    outside = sum("imagePath" in owner and path.rpartition(".")[2].startswith("perImage") for path, owner in objects)
+    outside = sum("imagePath" in owner and path.rpartition(".")[2].startswith("perImage") for path, owner, _ in objects)
     parts = [f"{len(stack)} JPEG focal-stack images"] if stack else []
     parts += [f"{outside} images in files beside it"] if outside else []
     for reference in known:
@@ -106,7 +110,17 @@ def processed_picture(container: Container) -> str:
     return f"a processed picture ({', '.join(kinds)}) with {', '.join(parts) if parts else 'no images'}"
 
 
-def section_text(container: Container, section: Section, data: bytes, known: tuple[Reference, ...]) -> str:
+def by_section(container: Container, known: Iterable[Reference]) -> dict[Section, Reference]:
+    """Return the first reference to each section of a file."""
+    found: dict[Section, Reference] = {}
+    for reference in known:
+        section = container.find(reference.name)
+        if section is not None:
+            found.setdefault(section, reference)
+    return found
+
+
+def section_text(container: Container, section: Section, data: bytes, reference: Reference | None) -> str:
     """Return in words what a section holds.
 
     Parameters
@@ -117,12 +131,11 @@ def section_text(container: Container, section: Section, data: bytes, known: tup
         The section.
     data
         Its data, damaged or not.
-    known
-        `references` of the table of contents.
+    reference
+        The first one to it; ``None`` where the table of contents does not name it.
     """
     if section.kind == "toc":
         return "table of contents, JSON"
-    reference = next((r for r in known if container.find(r.name) == section), None)
     if reference is None:
         return f"{_sniffed(data)}, not referred to"
     if reference.key == "imageRef" and reference.parent == "frame":
@@ -134,7 +147,7 @@ def section_text(container: Container, section: Section, data: bytes, known: tup
     if reference.key == "imageRef":
         role = "thumbnail" if reference.parent.startswith("thumbnail") else _word(reference.parent)
         focus = reference.owner.get("focus", reference.owner.get("lambda"))
-        place = f"focused at lambda {focus:g}" if isinstance(focus, int | float) else role
+        place = f"focused at lambda {focus:g}" if _is_number(focus) else role
         return f"{_sniffed(data)}, {place}"
     words = "".join(f" {c.lower()}" if c.isupper() else c for c in _word(reference.key.removesuffix("Ref")))
     return f"{words} ({_sniffed(data)})"
@@ -177,11 +190,13 @@ def _sniffed(data: bytes) -> str:
     return "binary data"
 
 
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and abs(value) <= LARGEST
+
+
 def _map_text(reference: Reference, container: Container) -> str:
-    owner_path = reference.path.rpartition(".")[0]
-    around = dict(_objects(container.toc)).get(owner_path.rpartition(".")[0], {})
-    width, height = (reference.owner.get(side, around.get(side)) for side in ("width", "height"))
-    if not isinstance(width, int) or not isinstance(height, int):
+    width, height = (reference.owner.get(side, reference.around.get(side)) for side in ("width", "height"))
+    if not (isinstance(width, int) and isinstance(height, int) and _is_number(width) and _is_number(height)):
         return f"{_MAPS[reference.parent]} of unknown size"
     section = container.find(reference.name)
     floats = section is not None and section.length == width * height * _FLOAT_BYTES
@@ -190,20 +205,35 @@ def _map_text(reference: Reference, container: Container) -> str:
 
 def _accelerations(toc: Json) -> Iterator[Json]:
     """Yield what Lytro calls accelerations: the pictures and maps that its programs have computed."""
-    for _, owner in _objects(toc):
+    for _, owner, _ in _objects(toc):
         for key in ("accelerations", "accelerationArray"):
             items = owner.get(key)
             yield from (item for item in (items if isinstance(items, list) else ()) if isinstance(item, dict))
 
 
-def _objects(toc: Json) -> Iterator[tuple[str, Json]]:
-    """Yield every object inside a table of contents with its path, in the order of the table."""
-    waiting: list[tuple[str, object]] = [("", toc)]
+def _objects(toc: Json) -> Iterator[tuple[str, Json, Json]]:
+    """Yield every object inside a table of contents with its path and the object around it, in the table's order."""
+    yield "", toc, {}
+    waiting = [_inner("", toc, toc)]
     while waiting:
-        path, value = waiting.pop()
+        found = next(waiting[-1], None)
+        if found is None:
+            waiting.pop()
+            continue
+        path, value, around = found
         if isinstance(value, dict):
-            yield path, value
-            inner = [(f"{path}.{key}" if path else key, item) for key, item in value.items()]
-        else:
-            inner = [(f"{path}[{i}]", item) for i, item in enumerate(value)] if isinstance(value, list) else []
-        waiting += reversed(inner)
+            yield path, value, around
+            around = value
+        waiting.append(_inner(path, value, around))
+
+
+_Place: TypeAlias = tuple[str, Json | list[Any], Json]
+
+
+def _inner(path: str, value: Json | list[Any], around: Json) -> Iterator[_Place]:
+    """Yield the objects and lists in one object or list; long keys are cut, so that paths stay short."""
+    if isinstance(value, dict):
+        named = ((f"{path}.{key[:_LONGEST_KEY]}" if path else key[:_LONGEST_KEY], item) for key, item in value.items())
+    else:
+        named = ((f"{path}[{n}]", item) for n, item in enumerate(value))
+    return ((name, item, around) for name, item in named if isinstance(item, dict | list))

@@ -9,6 +9,7 @@ from pathlib import Path
 from lfstereo.container.capture import BARE_SUFFIX, check_raw_size, read_metadata, read_sidecar
 from lfstereo.container.contents import (
     Reference,
+    by_section,
     find_frame_section,
     frame_section,
     processed_picture,
@@ -72,7 +73,8 @@ def describe(path: Path) -> Description:
         return _describe_bare(path)
     container = read_container(path)
     known = references(container.toc)
-    sections = tuple(_report(container, section, known) for section in container.sections)
+    named = by_section(container, known)
+    sections = tuple(_report(container, section, named.get(section)) for section in container.sections)
     processed = processed_picture(container)
     raw = find_frame_section(container, "imageRef")
     if raw is None and not processed:
@@ -114,7 +116,7 @@ def _capture_text(metadata: FrameMetadata | None) -> str:
     return f"{kind} of a Lytro {metadata.model}"
 
 
-def _report(container: Container, section: Section, known: tuple[Reference, ...]) -> SectionReport:
+def _report(container: Container, section: Section, reference: Reference | None) -> SectionReport:
     data = container.read_unverified(section)
     return SectionReport(
         kind=section.kind,
@@ -122,5 +124,5 @@ def _report(container: Container, section: Section, known: tuple[Reference, ...]
         length=section.length,
         sha1=section.sha1,
         intact=hashlib.sha1(data, usedforsecurity=False).hexdigest() == section.sha1,
-        what=section_text(container, section, data, known),
+        what=section_text(container, section, data, reference),
     )

@@ -11,10 +11,12 @@ import tifffile
 
 from lfstereo.arrays import Float64
 from lfstereo.container.capture import Capture
+from lfstereo.container.expansion import check_expansion
 from lfstereo.container.layouts import frame_parameters, private_metadata, public_metadata
 from lfstereo.container.metadata import FrameMetadata, parse_metadata
 from lfstereo.container.reader import parse_json
-from lfstereo.errors import ContainerError, MetadataError
+from lfstereo.container.serials import is_mark
+from lfstereo.errors import ContainerError, InputError, MetadataError
 from lfstereo.outputs import atomic_file, check_absent, check_space
 
 _BYTE, _ASCII, _SHORT, _RATIONAL, _SRATIONAL = 1, 2, 3, 5, 10
@@ -79,8 +81,11 @@ def read_dng(path: Path) -> Capture:
     try:
         with tifffile.TiffFile(path) as file:
             page = file.pages.first
+            check_expansion(path.stat().st_size, int(page.nbytes), str(path))
             private = page.tags.valueof(_PRIVATE_DATA)
             mosaic = np.asarray(page.asarray()) if isinstance(private, bytes) else None
+    except InputError:
+        raise
     except Exception as error:  # damaged files fail in many ways there
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise ContainerError(f"{path}: not a readable DNG ({reason}); export the capture again") from error
@@ -158,7 +163,7 @@ def _tags(metadata: FrameMetadata, where: str) -> list[tuple[int, int, int, Any,
         (50778, _SHORT, 1, _D65_ILLUMINANT, True),
         (50964, _SRATIONAL, 9, _fractions(forward.ravel()), True),
     ]
-    if m.serial:
+    if m.serial and not is_mark(m.serial):
         tags.append((50735, _ASCII, 0, m.serial, True))
     return tags
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from lfstereo.arrays import UInt16
-from lfstereo.container.fields import Json
+from lfstereo.container.fields import LARGEST, LONGEST_TEXT, Json
 from lfstereo.container.reader import parse_json
 from lfstereo.errors import ContainerError, MetadataError
 
@@ -50,9 +50,10 @@ def parse_serial(data: bytes, where: str) -> str:
     """
     camera = parse_json(data, where).get("camera")
     serial = camera.get("serialNumber") if isinstance(camera, dict) else None
-    if not isinstance(serial, str) or not serial:
+    if not isinstance(serial, str) or not 0 < len(serial) <= LONGEST_TEXT or not serial.isprintable():
         raise MetadataError(
-            f"{where}: field camera.serialNumber: found {serial!r}, expected the camera's serial number"
+            f"{where}: field camera.serialNumber: found {repr(serial)[:60]}, expected the camera's serial number; copy "
+            "the file again"
         )
     return serial
 
@@ -153,9 +154,13 @@ def parse_manifest(data: bytes, where: str) -> dict[str, str]:
 
 def _numbers(table: Json, name: str, where: str) -> list[float]:
     values = table.get(name)
-    if not isinstance(values, list) or not all(isinstance(v, int | float) for v in values):
+    if not isinstance(values, list) or not all(_is_number(value) for value in values):
         raise MetadataError(f"{where}: field {name}: found no list of numbers, expected one; copy the file again")
     return [float(value) for value in values]
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and -LARGEST <= value <= LARGEST
 
 
 def _rows(table: Json, name: str, count: int, where: str) -> list[list[float]]:
@@ -166,7 +171,7 @@ def _rows(table: Json, name: str, count: int, where: str) -> list[list[float]]:
     found: list[list[float]] = []
     for row in rows:
         values = row if isinstance(row, list) else [row]
-        if not all(isinstance(value, int | float) for value in values):
+        if not all(_is_number(value) for value in values):
             raise MetadataError(f"{where}: field {name}: found something else than numbers; copy the file again")
         found.append([float(value) for value in values])
     return found

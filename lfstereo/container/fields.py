@@ -11,6 +11,8 @@ Json: TypeAlias = dict[str, Any]
 """A parsed JSON object."""
 LARGEST = 1e30
 """No number in metadata is near it; keeps whole numbers of any length convertible to float."""
+LONGEST_TEXT = 256
+"""The longest that a camera writes is a date of 24 characters."""
 _ABSENT, _DEFAULT = object(), object()
 
 
@@ -53,11 +55,8 @@ class Fields:
         return int(value)
 
     def text(self, *paths: str, default: str | None = None) -> str:
-        """Return a text."""
-        value = self._find(paths, _ABSENT if default is None else default)
-        if not isinstance(value, str):
-            raise self._unfit(paths, value, "a text")
-        return value
+        """Return a short text on one line."""
+        return self._short_text(paths, self._find(paths, _ABSENT if default is None else default))
 
     def choice(self, paths: tuple[str, ...], allowed: tuple[str, ...]) -> str:
         """Return one of the allowed texts."""
@@ -102,11 +101,13 @@ class Fields:
         return value
 
     def private_text(self, path: str) -> str:
-        """Return a text of the private metadata; empty where it is missing."""
+        """Return a short text of the private metadata; empty where it is missing."""
         found = (_walk(layer, tuple(path.split("."))) for layer in self.private)
-        value = next((v for v in found if v is not _ABSENT), "")
-        if not isinstance(value, str):
-            raise self._unfit((path,), value, "a text")
+        return self._short_text((path,), next((v for v in found if v is not _ABSENT), ""))
+
+    def _short_text(self, paths: tuple[str, ...], value: object) -> str:
+        if not isinstance(value, str) or len(value) > LONGEST_TEXT or not value.isprintable():
+            raise self._unfit(paths, value, f"a text on one line of at most {LONGEST_TEXT} characters")
         return value
 
     def _find(self, paths: tuple[str, ...], default: object) -> Any:

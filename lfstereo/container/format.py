@@ -14,7 +14,7 @@ from __future__ import annotations
 import hashlib
 import struct
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal, TypeAlias
 
@@ -73,11 +73,15 @@ class Container:
     sections: tuple[Section, ...]
     size: int
     """Bytes of the whole file."""
+    _by_sha1: dict[str, Section] = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        first = {section.sha1: section for section in reversed(self.sections)}
+        object.__setattr__(self, "_by_sha1", first)
 
     def find(self, name: str) -> Section | None:
         """Return the section with a name such as ``sha1-0360f8…``, or None where the file has none."""
-        wanted = name.lower().removeprefix("sha1-")
-        return next((s for s in self.sections if s.sha1 == wanted), None)
+        return self._by_sha1.get(name.lower().removeprefix("sha1-"))
 
     def read(self, section: Section) -> bytes:
         """Read the data of a section and verify their SHA-1.

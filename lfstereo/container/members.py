@@ -4,19 +4,20 @@ from __future__ import annotations
 
 import hashlib
 import re
-import tarfile
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
 from lfstereo.container.fields import Json
 from lfstereo.container.reader import read_container
+from lfstereo.container.tar_entries import tar_entries
 from lfstereo.errors import ContainerError
 
 TAR_SUFFIX = ".tar"
 _VOLUME_NAME = re.compile(r"\.C\.\d+$", re.IGNORECASE)
 """The desktop program of the first camera keeps its backup in ``data.C.0`` and the volumes that follow."""
 _DRIVE = re.compile(r"^[A-Za-z]:")
+_LONGEST_NAME = 1024
 _UNFINISHED = ".partial"
 """How `lfstereo.outputs` names what it has not finished."""
 
@@ -50,8 +51,9 @@ class Member:
         """
         try:
             with self.file.open("rb") as file:
+                rest = file.seek(0, 2) - self.offset
                 file.seek(self.offset)
-                data = file.read(self.length)
+                data = file.read(min(self.length, rest)) if rest > 0 else b""
         except OSError as error:
             raise ContainerError(f"{self.where}: cannot be read ({error.strerror}); check its permissions") from error
         if len(data) != self.length:
@@ -122,12 +124,8 @@ def _archive_members(path: Path) -> Iterator[Member]:
 
 def _tar_members(path: Path) -> Iterator[Member]:
     try:
-        with tarfile.open(path, mode="r:") as archive:
-            for entry in archive:
-                if entry.isreg():
-                    yield Member(_clean(entry.name, path), path, entry.offset_data, entry.size)
-    except (tarfile.TarError, EOFError) as error:
-        raise ContainerError(f"{path}: found no readable tar archive ({error}); copy it again") from error
+        for entry in tar_entries(path):
+            yield Member(_clean(entry.name, path), path, entry.offset, entry.length)
     except OSError as error:
         raise ContainerError(f"{path}: cannot be read ({error.strerror}); check its permissions") from error
 
@@ -147,12 +145,12 @@ def _volume_members(path: Path) -> Iterator[Member]:
             f"{path}: found that volume {Path(following).name!r} follows, which is missing; copy all volumes"
         )
     for name, reference in _listed_files(container.toc, path):
-        section = container.find(reference)
+        section, inside = container.find(reference), _clean(name, path)
         if section is None:
             raise ContainerError(
-                f"{path}: byte {container.size}: the file ends here, expected the section of {name}; copy it again"
+                f"{path}: byte {container.size}: the file ends here, expected the section of {inside}; copy it again"
             )
-        yield Member(_clean(name, path), path, section.data_offset, section.length, section.sha1)
+        yield Member(inside, path, section.data_offset, section.length, section.sha1)
 
 
 def _listed_files(toc: Json, path: Path) -> Iterator[tuple[str, str]]:
@@ -179,6 +177,7 @@ def _clean(name: str, path: Path) -> str:
     'T1CALIB/MOD_0000.RAW'
     """
     parts = PurePosixPath(_DRIVE.sub("", name).replace("\\", "/").lstrip("/")).parts
-    if not parts or ".." in parts:
-        raise ContainerError(f"{path}: found a file named {name!r}, expected a path inside the archive; do not use it")
+    if not parts or ".." in parts or not name.isprintable() or len(name) > _LONGEST_NAME:
+        shown = repr(name[:60])
+        raise ContainerError(f"{path}: found a file named {shown}, expected a path inside the archive; do not use it")
     return "/".join(parts)

@@ -13,7 +13,8 @@ from lfstereo.assets import asset_folder
 from lfstereo.container.capture import IMAGE_SUFFIXES, Capture
 from lfstereo.container.jpeg_mosaic import restore_mosaic
 from lfstereo.container.metadata import FrameMetadata, parse_metadata
-from lfstereo.errors import AssetError, ContainerError
+from lfstereo.container.picture_size import is_picture
+from lfstereo.errors import AssetError, ContainerError, MetadataError
 from lfstereo.options import read_toml
 
 _FINER = 16
@@ -54,9 +55,13 @@ def read_camera_profile(camera: str, bits: int | None = None) -> FrameMetadata:
     if bits != 8:
         return metadata
     sites = ("r", "gr", "gb", "b")
-    levels = profile.get("levels_8_bit", {})
+    levels, image = profile.get("levels_8_bit"), profile.get("image")
+    if not isinstance(levels, dict) or not isinstance(image, dict):
+        raise MetadataError(
+            f"{path}: found no tables [image] and [levels_8_bit], expected both for a mosaic of 8 bits; add them"
+        )
     stored = {level: dict.fromkeys(sites, levels.get(level)) for level in ("black", "white")}
-    image = profile["image"] | {"pixelFormat": stored, "pixelPacking": {"bitsPerPixel": 8, "endianness": "little"}}
+    image = image | {"pixelFormat": stored, "pixelPacking": {"bitsPerPixel": 8, "endianness": "little"}}
     return parse_metadata(profile | {"image": image}, None, f"{path}: levels_8_bit")
 
 
@@ -128,6 +133,8 @@ def _read_pixels(path: Path) -> UInt8 | UInt16:
         data = path.read_bytes()
     except OSError as error:
         raise ContainerError(f"{path}: cannot be read ({error.strerror}); give a JPEG, PNG or TIFF") from error
+    if not is_picture(data, str(path)):
+        raise ContainerError(f"{path}: cannot be read as an image (no known head); give a complete JPEG, PNG or TIFF")
     try:
         pixels = np.asarray(iio.imread(data, extension=path.suffix.lower()))
     except Exception as error:  # every decoder has its own kinds

@@ -23,8 +23,12 @@ from lfstereo.container.format import (
 from lfstereo.container.metadata import frame_entries
 from lfstereo.errors import ContainerError
 
-LARGEST_JSON_BYTES = 64 << 20
+LARGEST_JSON_BYTES = 8 << 20
 """No camera writes more than some 100 kB; refused above, so that a damaged file cannot fill the memory."""
+DEEPEST_JSON = 64
+"""The cameras' own metadata are nested 8 deep."""
+_MOST_SECTIONS = 10_000
+"""A picture has up to 30, a camera's backup volume some hundred."""
 _COPY_AGAIN = "the file is damaged, copy it again from the camera"
 _CUT_OFF = "the file is cut off, copy it again from the camera"
 _PADDING_BLOCK = 1 << 16
@@ -87,17 +91,29 @@ def parse_json(data: bytes, where: str) -> Json:
     Raises
     ------
     ContainerError
-        If the bytes are not UTF-8, not JSON, or JSON of another kind.
+        If the bytes are not UTF-8, not JSON, nested deeper than any metadata, or JSON of another kind.
     """
     try:
         value = json.loads(data.rstrip(b"\0").decode("utf-8-sig"))
-    except RecursionError as error:
-        raise ContainerError(f"{where}: found JSON nested too deeply, expected metadata; {_COPY_AGAIN}") from error
+        shallow = _is_shallow(value)
+    except RecursionError:
+        shallow = False
     except ValueError as error:
         raise ContainerError(f"{where}: found no valid JSON ({error}), expected metadata; {_COPY_AGAIN}") from error
+    if not shallow:
+        raise ContainerError(f"{where}: found JSON nested too deeply, expected metadata; {_COPY_AGAIN}")
     if not isinstance(value, dict):
         raise ContainerError(f"{where}: found JSON of type {type(value).__name__}, expected an object; {_COPY_AGAIN}")
     return value
+
+
+def _is_shallow(value: object) -> bool:
+    """Return whether objects and lists are nested at most `DEEPEST_JSON` deep."""
+    level = [value]
+    for _ in range(DEEPEST_JSON + 1):
+        inner = (item.values() if isinstance(item, dict) else item for item in level if isinstance(item, dict | list))
+        level = [item for items in inner for item in items]
+    return not level
 
 
 def _find_sections(path: Path, file: BinaryIO, size: int) -> tuple[Section, ...]:
@@ -111,6 +127,10 @@ def _find_sections(path: Path, file: BinaryIO, size: int) -> tuple[Section, ...]
     sections: list[Section] = []
     offset = len(FILE_HEAD)
     while (offset := _skip_padding(file, offset)) < size:
+        if len(sections) == _MOST_SECTIONS:
+            raise ContainerError(
+                f"{path}: byte {offset}: found more than {_MOST_SECTIONS} sections, expected a few dozen; {_COPY_AGAIN}"
+            )
         section = _read_head(path, file, offset, size)
         sections.append(section)
         offset = section.data_offset + section.length
