@@ -19,6 +19,8 @@ from typing import Any, TypeVar
 from lfstereo.errors import ConfigError
 
 OptionsT = TypeVar("OptionsT")
+LARGEST_TOML_BYTES = 1 << 20
+_LONGEST_SHOWN = 60
 _TRUE, _FALSE = ("true", "yes", "1", "on"), ("false", "no", "0", "off")
 
 
@@ -34,17 +36,37 @@ def read_toml(path: Path) -> dict[str, Any]:
     Raises
     ------
     ConfigError
-        If the file cannot be read or is not TOML.
+        If the file cannot be read, is far larger than any of lfstereo's, or is not TOML.
     """
     try:
-        return tomllib.loads(path.read_text("utf-8"))
+        with path.open("rb") as file:
+            data = file.read(LARGEST_TOML_BYTES + 1)
     except OSError as error:
         raise ConfigError(f"{path}: cannot be read ({error.strerror}); give the path of a TOML file") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise ConfigError(f"{path}: not valid TOML ({error}); correct that place") from error
+    if len(data) > LARGEST_TOML_BYTES:
+        raise ConfigError(f"{path}: found more than {LARGEST_TOML_BYTES} bytes, expected a TOML file of a few pages")
+    return parse_toml(data, str(path))
 
 
-def from_mapping(cls: type[OptionsT], values: Mapping[str, Any], where: str) -> OptionsT:
+def parse_toml(data: bytes, where: str) -> dict[str, Any]:
+    """Parse TOML.
+
+    Raises
+    ------
+    ConfigError
+        If it is not TOML, is nested too deeply, or holds a number or date that cannot be.
+    """
+    try:
+        return tomllib.loads(data.decode("utf-8"))
+    except RecursionError as error:
+        raise ConfigError(f"{where}: not valid TOML (nested too deeply); correct that place") from error
+    except ValueError as error:
+        raise ConfigError(f"{where}: not valid TOML ({error}); correct that place") from error
+
+
+def from_mapping(
+    cls: type[OptionsT], values: Mapping[str, Any], where: str, given: Mapping[str, Any] | None = None
+) -> OptionsT:
     """Build options from a parsed TOML table.
 
     Parameters
@@ -55,23 +77,33 @@ def from_mapping(cls: type[OptionsT], values: Mapping[str, Any], where: str) -> 
         Names and values; names not given keep their defaults.
     where
         File and table, for messages.
+    given
+        Fields that are built already.
 
     Raises
     ------
     ConfigError
-        For a name that is no option, or a value of the wrong type.
+        If the values are no table, for a name that is no option, or a value of the wrong type.
     """
+    if not isinstance(values, Mapping):
+        raise ConfigError(f"{where}: found {_cut(values)}, expected a table of options")
     hints = typing.get_type_hints(cls)
     known = [f.name for f in dataclasses.fields(typing.cast(Any, cls))]
     resolved: dict[str, Any] = {}
     for name, value in values.items():
         if name not in known:
-            raise ConfigError(f"{where}: '{name}' is not an option; known are {', '.join(known)}")
+            raise ConfigError(f"{where}: {_cut(name)} is not an option; known are {', '.join(known)}")
         try:
             resolved[name] = _convert(value, hints[name])
-        except (TypeError, ValueError) as error:
-            raise ConfigError(f"{where}: {name} = {value!r} does not fit: {error}") from error
-    return cls(**resolved)
+        except (TypeError, ValueError, OverflowError) as error:
+            raise ConfigError(f"{where}: {name} = {_cut(value)} does not fit: {_cut(str(error), 200)}") from error
+    return cls(**resolved, **(given or {}))
+
+
+def _cut(value: object, longest: int = _LONGEST_SHOWN) -> str:
+    """Return a value for a message: on one line and not longer than that."""
+    shown = value if isinstance(value, str) and value.isprintable() and longest > _LONGEST_SHOWN else repr(value)
+    return shown if len(shown) <= longest else shown[: longest - 3] + "..."
 
 
 def to_toml(options: Any) -> str:
@@ -172,8 +204,11 @@ def _convert(value: Any, kind: Any) -> Any:
         raise TypeError(f"expected {kind.__name__}, found true/false")
     if kind is int and isinstance(value, float) and not value.is_integer():
         raise ValueError("expected a whole number")
-    if kind in (str, Path) and not isinstance(value, str | Path):
-        raise TypeError("expected text")
+    if kind in (str, Path):
+        if not isinstance(value, str | Path) or "\0" in str(value):
+            raise TypeError("expected text")
+    elif not isinstance(value, str | int | float):
+        raise TypeError("expected a number")
     return kind(value)
 
 
