@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 from typing import Any
 
@@ -11,10 +10,11 @@ import numpy as np
 
 from lfstereo.develop.colour_spaces import PRIMARIES
 from lfstereo.develop.options import Primaries
-from lfstereo.errors import ContainerError
+from lfstereo.errors import ContainerError, InputError
 from lfstereo.lightfield.encoding import from_codes, to_codes
 from lfstereo.lightfield.field import LightField, ViewSampling
 from lfstereo.lightfield.interchange import eslf, lftoolbox_mat
+from lfstereo.lightfield.interchange.hdf5_guard import stored_dataset
 from lfstereo.lightfield.interchange.picture_folders import read_picture_folder
 from lfstereo.outputs import atomic_file, check_absent, check_space
 
@@ -22,7 +22,6 @@ SUFFIXES = (".h5", ".hdf5")
 FORMAT_NAME = "lfstereo light field"
 FORMAT_VERSION = 1
 _ENCODING = "square root"
-_LARGEST_VALUES = 4 * 10**9
 _FOREIGN = {lftoolbox_mat.SUFFIX: lftoolbox_mat.read_decoded_mat, eslf.SUFFIX: eslf.read_eslf}
 _STEPS = ("zoom_step", "focus_step")
 _SAMPLING = {"origin_px": 2, "step_px": 2, "rotation_rad": 1, "view_step_px": 1}
@@ -54,8 +53,10 @@ def read_light_field(path: Path) -> LightField:
     try:
         with h5py.File(path, "r") as file:
             return _read(file, path)
-    except (OSError, KeyError, RuntimeError) as error:
-        reason = str(error).splitlines()[0]
+    except InputError:
+        raise
+    except Exception as error:  # damaged files fail in many ways there
+        reason = (str(error).splitlines() or [type(error).__name__])[0]
         raise ContainerError(f"{path}: not a readable HDF5 file ({reason}); decode the capture again") from error
 
 
@@ -134,7 +135,7 @@ def _read(file: Any, path: Path) -> LightField:
     if views.shape[4] != 3:
         raise ContainerError(f"{path}: 'views' has shape {views.shape}, expected three colours last")
     peak = views.attrs.get("peak")
-    if views.attrs.get("encoding") != _ENCODING or not _is_number(peak) or not peak > 0:
+    if not np.array_equal(views.attrs.get("encoding"), _ENCODING) or not _is_number(peak) or not peak > 0:
         raise ContainerError(
             f"{path}: 'views' has encoding {views.attrs.get('encoding')!r} and peak {peak}, expected '{_ENCODING}' and "
             "a positive number; decode the capture again"
@@ -158,22 +159,12 @@ def _read(file: Any, path: Path) -> LightField:
 
 
 def _dataset(file: Any, name: str, dtype: np.dtype[Any], axes: int, path: Path) -> Any:
-    found = file.get(name)
-    if not isinstance(found, h5py.Dataset):
+    found = stored_dataset(file, name, path)
+    if found is None:
         raise ContainerError(f"{path}: found no dataset '{name}', expected one; decode the capture again")
     if found.dtype != dtype or found.ndim != axes or min(found.shape) < 1:
         raise ContainerError(
             f"{path}: '{name}' is {found.dtype} of shape {found.shape}, expected {dtype} with {axes} axes"
-        )
-    count = math.prod(found.shape)
-    if found.external or found.is_virtual or count > _LARGEST_VALUES:
-        raise ContainerError(
-            f"{path}: '{name}' of shape {found.shape} does not lie in this file, expected that it does"
-        )
-    if found.id.get_storage_size() < count * dtype.itemsize:
-        raise ContainerError(
-            f"{path}: '{name}' holds {found.id.get_storage_size()} of {count * dtype.itemsize} bytes; the file was cut "
-            "off, decode the capture again"
         )
     return found
 
@@ -201,13 +192,13 @@ def _sampling(file: Any, path: Path) -> ViewSampling | None:
 
 
 def _primaries(file: Any, path: Path) -> Primaries:
-    found = file.attrs.get("colour_space", "srgb")
-    if found not in PRIMARIES.values():
+    found: Any = file.attrs.get("colour_space", "srgb")
+    if not isinstance(found, str) or found not in PRIMARIES.values():
         raise ContainerError(
             f"{path}: found colour space {found!r}, expected {', '.join(sorted(set(PRIMARIES.values())))}; decode the "
             "capture again with this version of lfstereo"
         )
-    primaries: Primaries = found
+    primaries: Primaries = found  # type: ignore[assignment]
     return primaries
 
 

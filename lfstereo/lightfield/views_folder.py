@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 
 from lfstereo.arrays import Rgb, UInt8, UInt16
+from lfstereo.container.picture_size import decoded_picture
 from lfstereo.develop.colour_spaces import PRIMARIES
 from lfstereo.develop.options import Primaries
 from lfstereo.errors import ContainerError, ShapeError
@@ -156,7 +157,10 @@ def _from_zero(named: list[tuple[tuple[int, int], Path]], folder: Path) -> dict[
 
 
 def _read_picture(path: Path) -> UInt8 | UInt16:
-    picture = cv2.imread(str(path), cv2.IMREAD_COLOR | cv2.IMREAD_ANYDEPTH)
+    try:
+        picture = decoded_picture(path.read_bytes(), cv2.IMREAD_COLOR | cv2.IMREAD_ANYDEPTH, str(path))
+    except OSError as error:
+        raise ContainerError(f"{path}: cannot be read ({error.strerror}); check its permissions") from error
     if picture is None or picture.dtype not in (np.uint8, np.uint16):
         raise ContainerError(f"{path}: cannot be read as an 8-bit or 16-bit image; write it again")
     turned: UInt8 | UInt16 = np.ascontiguousarray(picture[..., ::-1])

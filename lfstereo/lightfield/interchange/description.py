@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import dataclasses
-import math
-import tomllib
 from typing import Any
 
+from lfstereo.container.fields import LARGEST, LONGEST_TEXT
 from lfstereo.develop.colour_spaces import PRIMARIES
 from lfstereo.develop.options import ColourSpace
-from lfstereo.errors import ConfigError, ContainerError
+from lfstereo.errors import ContainerError
 from lfstereo.lightfield.field import LightField, ViewSampling
 from lfstereo.lightfield.options import PictureOptions
-from lfstereo.options import from_mapping, to_toml, toml_value
+from lfstereo.options import from_mapping, parse_toml, to_toml, toml_value
 
 FILE_NAME = "light_field.toml"
 """Name of the file beside views that holds the text."""
+MOST_VIEWS = 1000
+"""Per direction."""
 
 
 @dataclasses.dataclass(frozen=True, slots=True)
@@ -54,30 +55,32 @@ def from_text(text: str, where: str) -> Description:
         If it is not TOML, or a value in it cannot be.
     """
     try:
-        table = tomllib.loads(text)
+        table = parse_toml(text.encode("utf-8", "replace"), where)
         sampling = _sampling(table["sampling"], where) if "sampling" in table else None
         rows, columns = (int(n) for n in table["views"])
-        serial, space = table["serial"], table.get("colour_space", PLAIN.colour_space)
+        serial, space = table["serial"], str(table.get("colour_space", PLAIN.colour_space))
         exposure = float(table.get("exposure_ev", PLAIN.exposure_ev))
-    except (tomllib.TOMLDecodeError, ConfigError, KeyError, TypeError, ValueError) as error:
+    except (KeyError, TypeError, ValueError, OverflowError) as error:
         reason = str(error).splitlines()[0]
         raise ContainerError(f"{where}: not a description of a light field ({reason}); export it again") from error
-    if not isinstance(serial, str) or rows < 1 or columns < 1:
+    if not isinstance(serial, str) or len(serial) > LONGEST_TEXT or not serial.isprintable():
+        raise ContainerError(f"{where}: found serial {repr(serial)[:60]}, expected a text; export it again")
+    if not (1 <= rows <= MOST_VIEWS and 1 <= columns <= MOST_VIEWS):
         raise ContainerError(
-            f"{where}: found serial {serial!r} and {rows} x {columns} views, expected a text and positive numbers; "
-            "export it again"
+            f"{where}: found {rows} x {columns} views, expected 1 to {MOST_VIEWS} each; export it again"
         )
     if space not in PRIMARIES or not abs(exposure) <= 20:
         raise ContainerError(
-            f"{where}: found colour space {space!r} and exposure {exposure:g} EV, expected one of "
+            f"{where}: found colour space {space[:40]!r} and exposure {exposure:g} EV, expected one of "
             f"{', '.join(PRIMARIES)} and at most 20 EV; export it again"
         )
-    return Description((rows, columns), serial, sampling, space, exposure)
+    named: ColourSpace = space
+    return Description((rows, columns), serial, sampling, named, exposure)
 
 
 def _sampling(table: Any, where: str) -> ViewSampling:
-    sampling = from_mapping(ViewSampling, dict(table), f"{where} [sampling]")
+    sampling = from_mapping(ViewSampling, table, f"{where} [sampling]")
     numbers = (*sampling.origin_px, *sampling.step_px, sampling.rotation_rad, sampling.view_step_px)
-    if not all(math.isfinite(n) for n in numbers) or min(*sampling.step_px, sampling.view_step_px) <= 0:
+    if not all(abs(n) <= LARGEST for n in numbers) or min(*sampling.step_px, sampling.view_step_px) <= 0:
         raise ValueError(f"found sampling {numbers}, expected finite numbers and positive steps")
     return sampling

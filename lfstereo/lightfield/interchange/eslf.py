@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 
 from lfstereo.arrays import UInt8, UInt16
+from lfstereo.container.picture_size import PNG_START, decoded_picture
 from lfstereo.develop.colour_spaces import PRIMARIES
 from lfstereo.errors import ContainerError, OutputError
 from lfstereo.lightfield.encoding import from_picture, to_picture
@@ -81,8 +82,8 @@ def read_eslf(path: Path) -> LightField:
         data = path.read_bytes()
     except OSError as error:
         raise ContainerError(f"{path}: cannot be read ({error.strerror}); give a PNG file") from error
-    picture = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED) if data else None
-    if picture is None or picture.ndim != 3 or picture.dtype not in (np.uint8, np.uint16):
+    picture = decoded_picture(data, cv2.IMREAD_UNCHANGED, str(path)) if data.startswith(PNG_START) else None
+    if picture is None or picture.ndim != 3 or picture.shape[2] < 3 or picture.dtype not in (np.uint8, np.uint16):
         raise ContainerError(f"{path}: cannot be read as a PNG in colour; export the light field again")
     found = _description(data, path)
     rows, columns = found.views if found is not None else (_USUAL_VIEWS, _USUAL_VIEWS)

@@ -13,9 +13,11 @@ import numpy.typing as npt
 from lfstereo import __version__
 from lfstereo.develop.colour_spaces import PRIMARIES
 from lfstereo.develop.options import Primaries
-from lfstereo.errors import ContainerError
+from lfstereo.errors import ContainerError, InputError
 from lfstereo.lightfield.field import LightField
 from lfstereo.lightfield.interchange.description import from_text, to_text
+from lfstereo.lightfield.interchange.hdf5_guard import stored_dataset
+from lfstereo.lightfield.interchange.mat5_guard import check_mat5
 from lfstereo.lightfield.options import PictureOptions
 from lfstereo.outputs import atomic_file, check_absent, check_space
 from lfstereo.progress import Progress, silent
@@ -23,6 +25,7 @@ from lfstereo.progress import Progress, silent
 SUFFIX = ".mat"
 _USER_BLOCK_BYTES = 512
 _OWN_TEXT = "lfstereo"
+_LONGEST_TEXT = 1 << 16
 _LARGEST_VALUES = 4 * 10**9
 
 
@@ -89,8 +92,10 @@ def read_decoded_mat(path: Path) -> LightField:
             with h5py.File(path, "r") as file:
                 return _read_hdf5(file, path)
         return _read_older(path)
-    except (OSError, RuntimeError, KeyError, TypeError) as error:
-        reason = str(error).splitlines()[0]
+    except InputError:
+        raise
+    except Exception as error:  # damaged files fail in many ways there
+        reason = (str(error).splitlines() or [type(error).__name__])[0]
         raise ContainerError(f"{path}: not a readable MAT-file ({reason}); decode the capture again") from error
 
 
@@ -116,14 +121,10 @@ def _put(parent: Any, name: str, value: dict[str, Any] | float | str) -> None:
 
 
 def _read_hdf5(file: Any, path: Path) -> LightField:
-    stored = file.get("LF")
-    if not isinstance(stored, h5py.Dataset):
+    stored = stored_dataset(file, "LF", path)
+    if stored is None:
         raise ContainerError(f"{path}: found no variable 'LF', expected one; give a file named NAME__Decoded.mat")
     _check_kind(stored.shape[::-1], stored.dtype, path)
-    # Chunks that were never written read as zeros, so a cut-off file shows in what is stored.
-    whole = stored.size * stored.dtype.itemsize
-    if stored.external or stored.is_virtual or (not stored.compression and stored.id.get_storage_size() < whole):
-        raise ContainerError(f"{path}: 'LF' does not lie whole in this file; decode the capture again")
     channels, width, height, columns, rows = stored.shape
     views = np.empty((rows, columns, height, width, 3), np.float32)
     for c in range(3):
@@ -131,8 +132,9 @@ def _read_hdf5(file: Any, path: Path) -> LightField:
     weight = _weight(stored[3].transpose(3, 2, 1, 0)) if channels == 4 else None
     serial, sampling = "", None
     primaries: Primaries = "srgb"
-    if _OWN_TEXT in file:
-        text = np.asarray(file[_OWN_TEXT][()], np.uint16).tobytes().decode("utf-16-le", "replace")
+    own = stored_dataset(file, _OWN_TEXT, path)
+    if own is not None and own.dtype == np.uint16 and own.size <= _LONGEST_TEXT:
+        text = np.asarray(own[()], np.uint16).tobytes().decode("utf-16-le", "replace")
         found = from_text(text, f"{path}: {_OWN_TEXT}")
         serial, sampling, primaries = found.serial, found.sampling, PRIMARIES[found.colour_space]
     return LightField(_finite(views, path), weight, sampling, serial, str(path), colour_space=primaries)
@@ -141,11 +143,8 @@ def _read_hdf5(file: Any, path: Path) -> LightField:
 def _read_older(path: Path) -> LightField:
     from scipy.io import loadmat
 
-    try:
-        found = loadmat(path, variable_names=["LF"]).get("LF")
-    except Exception as error:  # damaged files fail in many ways there
-        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-        raise ContainerError(f"{path}: not a readable MAT-file ({reason}); decode the capture again") from error
+    check_mat5(path)
+    found = loadmat(path, variable_names=["LF"]).get("LF")
     if found is None:
         raise ContainerError(f"{path}: found no variable 'LF', expected one; give a file named NAME__Decoded.mat")
     stored = np.asarray(found)

@@ -14,7 +14,7 @@ from lfstereo.arrays import Rgb
 from lfstereo.errors import ContainerError
 from lfstereo.lightfield.encoding import to_picture
 from lfstereo.lightfield.field import LightField
-from lfstereo.lightfield.interchange.description import FILE_NAME, PLAIN, Description, from_text, to_text
+from lfstereo.lightfield.interchange.description import FILE_NAME, MOST_VIEWS, PLAIN, Description, from_text, to_text
 from lfstereo.lightfield.interchange.icc import icc_profile
 from lfstereo.lightfield.options import PictureOptions
 from lfstereo.lightfield.views_folder import read_views_folder, write_png
@@ -179,6 +179,8 @@ def _hci_views(folder: Path) -> tuple[int, int] | None:
         parameters.read_string(path.read_text("utf-8", "replace"))
         extrinsics = parameters["extrinsics"]
         rows, columns = int(extrinsics["num_cams_y"]), int(extrinsics["num_cams_x"])
+        if not (1 <= rows <= MOST_VIEWS and 1 <= columns <= MOST_VIEWS):
+            raise ValueError(f"found {rows} x {columns} views, expected 1 to {MOST_VIEWS} each")
     except (configparser.Error, KeyError, ValueError) as error:
         reason = str(error).splitlines()[0]
         raise ContainerError(

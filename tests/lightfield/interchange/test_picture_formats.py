@@ -203,7 +203,7 @@ def test_pictures_that_are_not_packed(tmp_path: Path, content: bytes, match: str
 @pytest.mark.parametrize(
     ("old", "new", "match"),
     [
-        ("views = [3, 5]", "views = [0, 5]", "expected a text and positive numbers"),
+        ("views = [3, 5]", "views = [0, 5]", "expected 1 to 1000 each"),
         ("views = [3, 5]", "views = 3", "not a description of a light field"),
         ("views = [3, 5]", "views = [3, 4]", r"found 3 x 5 views, expected 3 x 4 as in light_field\.toml"),
         ("view_step_px = 0.884", "view_step_px = -1.0", "expected finite numbers and positive steps"),
