@@ -7,7 +7,7 @@ import os
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import platformdirs
 from filelock import FileLock
@@ -15,6 +15,7 @@ from filelock import FileLock
 from lfstereo.errors import OutputError
 from lfstereo.outputs import atomic_file
 
+ValueT = TypeVar("ValueT")
 HOME_VARIABLE = "LFSTEREO_HOME"
 """Environment variable that names one folder for both, in place of the platform's own."""
 
@@ -31,7 +32,7 @@ def cache_folder() -> Path:
     return Path(home) / "cache" if home else platformdirs.user_cache_path("lfstereo")
 
 
-def remembered(name: str, compute: Callable[[], dict[str, Any]], usable: Callable[[dict[str, Any]], bool]) -> Any:
+def remembered(name: str, compute: Callable[[], dict[str, Any]], build: Callable[[Any], ValueT]) -> ValueT:
     """Return what was computed before under a name, or compute it now and keep it.
 
     Of several processes that ask at once one computes and the others wait for it. Where the cache cannot be
@@ -42,12 +43,13 @@ def remembered(name: str, compute: Callable[[], dict[str, Any]], usable: Callabl
     name
         File name inside the cache, without suffix; it must change whenever the value would.
     compute
-        Gives the value, an object that JSON can hold; its errors pass through and nothing is kept.
-    usable
-        Tells whether a stored value has the expected form; one that has not is computed again.
+        Gives an object that JSON can hold; its errors pass through and nothing is kept.
+    build
+        Turns that object, read from the cache or new, into the value. A stored one for which it raises ``KeyError``,
+        ``TypeError`` or ``ValueError`` is computed again.
     """
     path = cache_folder() / f"{name}.json"
-    found = _stored(path, usable)
+    found = _stored(path, build)
     if found is not None:
         return found
     try:
@@ -55,21 +57,21 @@ def remembered(name: str, compute: Callable[[], dict[str, Any]], usable: Callabl
         lock = FileLock(path.with_suffix(".lock"))
         lock.acquire()
     except (OSError, NotImplementedError):
-        return compute()
+        return build(compute())
     try:
-        found = _stored(path, usable)
+        found = _stored(path, build)
         if found is None:
-            found = compute()
+            computed = compute()
             with suppress(OutputError), atomic_file(path, force=True) as scratch:
-                scratch.write_text(json.dumps(found), "ascii")
+                scratch.write_text(json.dumps(computed), "ascii")
+            found = build(computed)
         return found
     finally:
         lock.release()
 
 
-def _stored(path: Path, usable: Callable[[dict[str, Any]], bool]) -> dict[str, Any] | None:
+def _stored(path: Path, build: Callable[[Any], ValueT]) -> ValueT | None:
     try:
-        found = json.loads(path.read_text("ascii"))
-    except (OSError, ValueError):
+        return build(json.loads(path.read_text("ascii")))
+    except (OSError, ValueError, TypeError, KeyError, RecursionError):
         return None
-    return found if isinstance(found, dict) and usable(found) else None

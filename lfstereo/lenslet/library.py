@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
-from collections.abc import Callable, Iterable
+import operator
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import Any
@@ -25,6 +26,7 @@ from lfstereo.container.factory_files import (
 from lfstereo.container.members import Member, finished_files, is_archive, list_members
 from lfstereo.container.metadata import FrameMetadata, parse_metadata
 from lfstereo.container.reader import parse_json
+from lfstereo.container.serials import same_camera
 from lfstereo.errors import AssetError, InputError
 from lfstereo.lenslet.home import remembered
 
@@ -32,6 +34,7 @@ _CAMERA_NAME_PART = "MOD_"
 """Part of the file name that the cameras give their white images."""
 _LAYOUT = 3
 """To be raised when the stored index changes its form."""
+_FARTHEST_BYTE = 1 << 62
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +114,8 @@ class WhiteLibrary:
         fitting = [
             white
             for white in self.whites
-            if (white.width, white.height) == size and (not metadata.serial or white.serial == metadata.serial)
+            if (white.width, white.height) == size
+            and (not metadata.serial or (white.serial and same_camera(white.serial, metadata.serial)))
         ]
 
         def distance(white: WhiteImage) -> tuple[bool, int, int, str]:
@@ -147,8 +151,9 @@ def open_library(place: Path) -> WhiteLibrary:
     # Whole paths, as the index is read again from other working folders.
     whole = place.resolve()
     name = hashlib.sha256(repr((_LAYOUT, str(whole), state)).encode()).hexdigest()
-    found = remembered(f"index-{name[:32]}", lambda: _to_json(_index(whole)), lambda stored: "whites" in stored)
-    return _from_json(found, place)
+    return remembered(
+        f"index-{name[:32]}", lambda: to_json(_index(whole)), lambda stored: library_from_json(stored, place)
+    )
 
 
 def _index(place: Path) -> WhiteLibrary:
@@ -208,7 +213,9 @@ def _nearest(by_folder: dict[str, Member], path: PurePosixPath) -> Member | None
     return next((by_folder[str(folder)] for folder in path.parents if str(folder) in by_folder), None)
 
 
-def _to_json(library: WhiteLibrary) -> dict[str, Any]:
+def to_json(library: WhiteLibrary) -> dict[str, Any]:
+    """Return a library as JSON can hold it."""
+
     def plain(value: object) -> object:
         return str(value) if isinstance(value, Path) else value
 
@@ -221,14 +228,46 @@ def _to_json(library: WhiteLibrary) -> dict[str, Any]:
     }
 
 
-def _from_json(stored: dict[str, Any], place: Path) -> WhiteLibrary:
-    def member(values: dict[str, Any] | None) -> Member | None:
-        return None if values is None else Member(**values | {"file": Path(values["file"])})
+def library_from_json(stored: Any, place: Path) -> WhiteLibrary:
+    """Return the library that `to_json` stored.
 
-    build: Callable[..., WhiteImage] = WhiteImage
-    parts = ("raw", "text", "hot_pixels", "factory", "unit_info", "manifest")
-    whites = tuple(
-        build(**w | {name: member(w[name]) for name in parts} | {"references": tuple(w["references"])})
-        for w in stored["whites"]
+    Raises
+    ------
+    KeyError, TypeError, ValueError
+        If a part of it is missing or cannot be.
+    """
+    problems = tuple(_text(problem) for problem in stored["problems"])
+    return WhiteLibrary(place, tuple(_white_from_json(white) for white in stored["whites"]), problems)
+
+
+def _white_from_json(white: Any) -> WhiteImage:
+    def optional(name: str) -> Member | None:
+        return None if white[name] is None else _member_from_json(white[name])
+
+    return WhiteImage(
+        raw=_member_from_json(white["raw"]),
+        text=_member_from_json(white["text"]),
+        serial=_text(white["serial"]),
+        zoom_step=operator.index(white["zoom_step"]),
+        focus_step=operator.index(white["focus_step"]),
+        width=operator.index(white["width"]),
+        height=operator.index(white["height"]),
+        references=tuple(_text(name) for name in white["references"]),
+        hot_pixels=optional("hot_pixels"),
+        factory=optional("factory"),
+        unit_info=optional("unit_info"),
+        manifest=optional("manifest"),
     )
-    return WhiteLibrary(place, whites, tuple(stored["problems"]))
+
+
+def _member_from_json(member: Any) -> Member:
+    place = operator.index(member["offset"]), operator.index(member["length"])
+    if min(place) < 0 or max(place) > _FARTHEST_BYTE:
+        raise ValueError(f"found a file at byte {place[0]} of {place[1]} bytes")
+    return Member(_text(member["name"]), Path(_text(member["file"])), *place, _text(member["sha1"]))
+
+
+def _text(value: object) -> str:
+    if not isinstance(value, str) or "\0" in value:
+        raise TypeError(f"found {value!r}, expected a text")
+    return value

@@ -7,6 +7,7 @@ from pathlib import Path
 from lfstereo.container.capture import Capture, read_capture
 from lfstereo.container.members import is_archive
 from lfstereo.container.metadata import FrameMetadata
+from lfstereo.container.serials import camera_mark, same_camera
 from lfstereo.errors import AssetError
 from lfstereo.lenslet.flatten import mean_brightness
 from lfstereo.lenslet.library import WhiteImage, WhiteLibrary, open_library
@@ -60,10 +61,10 @@ def whites_of_camera(library: WhiteLibrary, metadata: FrameMetadata) -> tuple[Wh
         )
     fitting = library.of_camera(metadata)
     if not fitting:
-        serials = sorted({white.serial or "none" for white in library.whites})
+        found = sorted({camera_mark(white.serial) or "unknown" for white in library.whites})
         raise AssetError(
-            f"{place}: found white images of serial {', '.join(serials)}, expected {metadata.serial or 'one camera'} "
-            f"({metadata.width} x {metadata.height} px) as the capture; give the white images of that camera"
+            f"{place}: found white images of camera {', '.join(found)}, expected "
+            f"{camera_mark(metadata.serial) or 'one'} ({metadata.width} x {metadata.height} px) as the capture; give the white images of that camera"
         )
     return fitting
 
@@ -84,7 +85,8 @@ def first_bright(whites: tuple[WhiteImage, ...]) -> tuple[WhiteImage, Capture]:
             return white, capture
     first = whites[0]
     raise AssetError(
-        f"{first.raw.where}: found only dark frames of serial {first.serial}; copy the camera's white images there"
+        f"{first.raw.where}: found only dark frames of camera {camera_mark(first.serial)}; copy the camera's white "
+        "images there"
     )
 
 
@@ -101,8 +103,8 @@ def refuse_other_camera(found: FrameMetadata, wanted: FrameMetadata, where: str)
             f"{where}: found a white image of {found.width} x {found.height} px, expected {wanted.width} x "
             f"{wanted.height} as the capture; give the white image of the same camera"
         )
-    if wanted.serial and found.serial != wanted.serial:
+    if wanted.serial and not (found.serial and same_camera(found.serial, wanted.serial)):
         raise AssetError(
-            f"{where}: found a white image of serial {found.serial or 'none'}, expected {wanted.serial} as the "
-            "capture; give the white image of the same camera"
+            f"{where}: found a white image of camera {camera_mark(found.serial) or 'unknown'}, expected "
+            f"{camera_mark(wanted.serial)} as the capture; give the white image of the same camera"
         )

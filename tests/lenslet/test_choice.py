@@ -129,7 +129,7 @@ def test_no_white_image_of_this_camera(
     photograph = at(frames.photograph[0], camera_files, 0, serial="SIM9")
     found = choose_grid(photograph, whites if given else None)
     assert found.grid.source == "photograph" and found.white is None and found.offset_px is None
-    reason = "found white images of serial SIM1, expected SIM9" if given else "no white images were given"
+    reason = "found white images of camera #fb1c, expected #f7d2" if given else "no white images were given"
     assert reason in found.warning
     assert "of its lenslets agree, standard error 0.0" in found.warning
     assert "\n" not in found.warning
