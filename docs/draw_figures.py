@@ -1,6 +1,8 @@
 """Draw the figures of the guide from the formulas of ``lfstereo.conventions`` and the shipped rig: three SVG files.
 
 python docs/draw_figures.py [-o docs/figures]
+
+README's picture is that of a demo: python docs/draw_figures.py --overview DEMO/
 """
 
 from __future__ import annotations
@@ -8,6 +10,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+import cv2
 import numpy as np
 
 from lfstereo.assets import asset_folder
@@ -19,6 +22,7 @@ HEAD = (
     '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {w} {h}" width="{w}" height="{h}" '
     'font-family="sans-serif" font-size="13"><rect width="{w}" height="{h}" fill="white"/>'
 )
+_JPEG_QUALITY = 85
 RIG = asset_folder("calib") / "rigs" / "simulated-illum-20mm.toml"
 
 
@@ -26,8 +30,13 @@ def main() -> None:
     """Write the figures."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("-o", "--output", type=Path, default=Path(__file__).parent / "figures")
-    output: Path = parser.parse_args().output
+    parser.add_argument("--overview", type=Path, metavar="DEMO", help="make README's picture, from a demo's folder")
+    arguments = parser.parse_args()
+    output: Path = arguments.output
     output.mkdir(parents=True, exist_ok=True)
+    if arguments.overview:
+        overview = np.asarray(cv2.imread(str(arguments.overview / "result" / "overview.png")))
+        cv2.imwrite(str(output.parent / "overview.jpg"), overview, [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY])
     for name, draw in (("views", views), ("slope", slope), ("disparity_depth", disparity_depth)):
         (output / f"{name}.svg").write_text(draw() + "</svg>\n", "utf-8")
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import re
 import shlex
 import subprocess
@@ -34,6 +35,14 @@ def test_links_and_named_commands_exist(page: Path) -> None:
     for link in re.findall(r"\]\(([^)#]+)", text):
         assert link.startswith("http") or (page.parent / link).exists(), link
     assert set(re.findall(r"`lfstereo ([a-z][a-z-]*)", text)) <= set(COMMANDS)
+
+
+def test_python_commands_exist() -> None:
+    texts = "\n".join(page.read_text("utf-8") for page in PAGES)
+    for module in set(re.findall(r"python -m ([\w.]+)", texts)):
+        assert importlib.util.find_spec(module), module
+    for script in set(re.findall(r"python (\w+/\w+\.py)", texts)):
+        assert (DOCS.parent / script).is_file(), script
 
 
 def test_every_page_is_in_the_list() -> None:
