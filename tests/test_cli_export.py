@@ -88,7 +88,7 @@ def test_rig_that_does_not_fit(scene: Path, rig: Path, capsys: pytest.CaptureFix
     assert main(words) == 3
     assert "--rig: found the format png, expected hci" in capsys.readouterr().err
     assert main([*words, "--format", "hci", "--side", "right"]) == 3
-    assert "found camera SIM1, expected SIM2, the right one of" in capsys.readouterr().err
+    assert "found camera #fb1c, expected #6b06, the right one of" in capsys.readouterr().err
     write_light_field(scene, replace(read_light_field(scene), sampling=None), force=True)
     assert main([*words, "--format", "hci"]) == 3
     assert "found views without a place on the sensor" in capsys.readouterr().err

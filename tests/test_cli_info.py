@@ -30,7 +30,7 @@ def test_text(picture: Path, capsys: pytest.CaptureFixture[str]) -> None:
     text = capsys.readouterr().out
     assert text.startswith(f"{picture}: a raw capture of a Lytro ILLUM\n")
     for line in (
-        "camera         Lytro, Inc. ILLUM, serial B51, firmware 2.0",
+        "camera         Lytro, Inc. ILLUM, serial B51 (mark #700d), firmware 2.0",
         "frame          48 x 40 px, 10 bits little-endian, Bayer grbg",
         "levels         black 64 64 64 64, white 1023 1023 1023 1023 (r, gr, gb, b)",
         "exposure       ISO 80, 10 ms, bias +0.000 EV",

@@ -187,7 +187,7 @@ def test_flipped_byte(pair: Path, tmp_path: Path, capsys: pytest.CaptureFixture[
 def test_no_white_image_of_this_camera(pair: Path, tmp_path: Path) -> None:
     whites = tmp_path / "whites"
     shutil.copytree(pair / "whites" / "SIM00000002", whites / "SIM00000002")
-    told = "serial SIM00000002, expected SIM00000001 .* estimated from the picture itself: 9.% of its lenslets agree"
+    told = "camera #0124, expected #1d1c .* estimated from the picture itself: 9.% of its lenslets agree"
     with pytest.warns(QualityWarning, match=told):
         open_light_field(pair / "left.LFR", whites)
 

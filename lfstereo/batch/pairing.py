@@ -11,8 +11,10 @@ from pathlib import Path
 from lfstereo.batch.captures import CaptureFile
 from lfstereo.batch.clocks import ClockOffset, pair_by_time
 from lfstereo.batch.options import BatchOptions, PairBy
+from lfstereo.container.serials import camera_mark
 from lfstereo.errors import ConfigError
 from lfstereo.rig.geometry import Side
+from lfstereo.rig.match import side_of
 from lfstereo.rig.rig import StereoRig
 
 USUAL_PATTERNS = ("{scene}_{side}", "{scene}-{side}", "{side}_{scene}", "{side}-{scene}", "{side}/{scene}", "{side}")
@@ -127,7 +129,7 @@ def _by_folder(captures: Sequence[CaptureFile], rig: StereoRig) -> Pairing:
 
 def _side(capture: CaptureFile, rig: StereoRig) -> Side | None:
     """Return the side by serial number; by file name where that tells nothing; ``None`` where they disagree."""
-    by_serial = {rig.left.serial: "left", rig.right.serial: "right"}.get(capture.serial) if capture.serial else None
+    by_serial = side_of(capture.serial, rig)
     words = re.split(r"[^a-z]+", capture.place.stem.lower())
     named = {_SIDE_WORDS[word] for word in words if word in _SIDE_WORDS}
     by_name = named.pop() if len(named) == 1 else None
@@ -176,15 +178,14 @@ def _compiled(pattern: str) -> re.Pattern[str]:
 
 def _by_time(captures: Sequence[CaptureFile], rig: StereoRig, options: BatchOptions) -> Pairing:
     leftovers, sides = [], {"left": list[CaptureFile](), "right": list[CaptureFile]()}
-    serials = {rig.left.serial: "left", rig.right.serial: "right"}
     for capture in captures:
-        side = serials.get(capture.serial) if capture.serial else None
+        side = side_of(capture.serial, rig)
         if capture.problem:
             leftovers.append(Leftover("unreadable", (capture,), capture.problem))
         elif side is None:
-            names = f"{rig.left.serial or 'any'} and {rig.right.serial or 'any'}"
+            names = " and ".join(camera_mark(camera.serial) or "any" for camera in (rig.left, rig.right))
             leftovers.append(
-                _alone(capture, f"taken by camera {capture.serial or 'of unknown serial'}, the rig's are {names}")
+                _alone(capture, f"taken by camera {camera_mark(capture.serial) or 'unknown'}, the rig's are {names}")
             )
         elif capture.taken_s is None:
             leftovers.append(_alone(capture, "its metadata tell no capture time"))

@@ -37,6 +37,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--preview", type=Path, help="picture of the views and the grid (default: beside the output)")
     parser.add_argument("--report", action="store_true", help="add a map of what the grid leaves to that picture")
     parser.add_argument("--config", type=Path, help="TOML file with options; the command line goes before it")
+    parser.add_argument("--keep-serials", action="store_true", help="write camera serial numbers, not only their marks")
     parser.add_argument("--force", action="store_true", help="replace an output that exists")
     parser.add_argument("--json", action="store_true", help="print the summary as JSON on stdout")
     methods = get_args(DecodeMethod)
@@ -54,6 +55,7 @@ def run(arguments: argparse.Namespace) -> int:
     check_absent(preview, arguments.force)
     options = _options(arguments)
 
+    from lfstereo.container.serials import camera_mark
     from lfstereo.lightfield.calibration import calibrate_photograph, decode_with
     from lfstereo.lightfield.interchange.formats import export_light_field
     from lfstereo.lightfield.interchange.lftoolbox_mat import SUFFIX as MAT_SUFFIX
@@ -69,6 +71,8 @@ def run(arguments: argparse.Namespace) -> int:
     with clock.stage("views") as progress:
         light_field = decode_with(capture, found, options, progress)
     with clock.stage("write"):
+        if not arguments.keep_serials:
+            light_field = replace(light_field, serial=camera_mark(light_field.serial))
         export_light_field(arguments.output, light_field, force=arguments.force)
         _write_preview(preview, light_field, capture, found, arguments)
     summary = _summary(light_field, found, clock)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -36,6 +37,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--rig", type=Path, help="rig file: lets depth be told from the disparities of an HCI folder")
     parser.add_argument("--side", choices=("left", "right"), default="left", help="camera of the rig (default: left)")
+    parser.add_argument("--keep-serials", action="store_true", help="write camera serial numbers, not only their marks")
     parser.add_argument("--force", action="store_true", help="replace an output that exists")
     add_arguments(parser, PictureOptions)
 
@@ -54,28 +56,34 @@ def run(arguments: argparse.Namespace) -> int:
     if to_dng:
         if pictures != PictureOptions():
             raise ConfigError(f"{target}: found options of pictures ({pictures}), expected none for a raw mosaic")
-        _export_capture(source, target, arguments.force, clock)
+        _export_capture(arguments, clock)
     else:
         _export_views(arguments, pictures, clock)
     print(f"written: {target}")
     return 0
 
 
-def _export_capture(source: Path, target: Path, force: bool, clock: StageClock) -> None:
+def _export_capture(arguments: argparse.Namespace, clock: StageClock) -> None:
     from lfstereo.container.capture import DNG_SUFFIX, read_capture
     from lfstereo.container.dng import write_dng
+    from lfstereo.container.serials import camera_mark
 
+    target = arguments.output
     if target.suffix.lower() != DNG_SUFFIX:
         raise ConfigError(
             f"{target}: found the suffix '{target.suffix}', expected {DNG_SUFFIX} for format dng; rename it"
         )
     with clock.stage("read"):
-        capture = read_capture(source)
+        capture = read_capture(arguments.input)
+        if not arguments.keep_serials:
+            marked = replace(capture.metadata, serial=camera_mark(capture.metadata.serial))
+            capture = replace(capture, metadata=marked)
     with clock.stage("write"):
-        write_dng(target, capture, force)
+        write_dng(target, capture, arguments.force)
 
 
 def _export_views(arguments: argparse.Namespace, pictures: PictureOptions, clock: StageClock) -> None:
+    from lfstereo.container.serials import camera_mark
     from lfstereo.lightfield.interchange.formats import check_pictures, choose_format, export_light_field
     from lfstereo.lightfield.interchange.picture_folders import write_hci_folder
     from lfstereo.lightfield.store import read_light_field
@@ -86,6 +94,8 @@ def _export_views(arguments: argparse.Namespace, pictures: PictureOptions, clock
         raise ConfigError(f"--rig: found the format {name}, expected hci; leave --rig out")
     with clock.stage("read"):
         light_field = read_light_field(arguments.input)
+        if not arguments.keep_serials:
+            light_field = replace(light_field, serial=camera_mark(light_field.serial))
         lengths = _lengths(arguments.rig, arguments.side, light_field) if arguments.rig is not None else None
     with clock.stage("write") as progress:
         if lengths is not None:
@@ -100,6 +110,7 @@ def _lengths(path: Path, side: str, light_field: LightField) -> HciLengths:
     The benchmark has ``1/Z = 1/Zf + d * sensor / (baseline * focal * width)``; here it is
     ``1/Z = 1/Zf + sigma / (fx / step * baseline)``.
     """
+    from lfstereo.container.serials import camera_mark, same_camera
     from lfstereo.lightfield.interchange.picture_folders import SENSOR_SIZE_MM, HciLengths
     from lfstereo.rig.rig import read_rig
 
@@ -111,10 +122,10 @@ def _lengths(path: Path, side: str, light_field: LightField) -> HciLengths:
             f"{light_field.source}: found views without a place on the sensor, expected a light field that was decoded "
             "from a raw capture, for --rig; leave --rig out"
         )
-    if camera.serial and light_field.serial and camera.serial != light_field.serial:
+    if not same_camera(camera.serial, light_field.serial):
         raise ConfigError(
-            f"{light_field.source}: found camera {light_field.serial}, expected {camera.serial}, the {side} one of "
-            f"{path}; give the other --side or the rig of this camera"
+            f"{light_field.source}: found camera {camera_mark(light_field.serial)}, expected "
+            f"{camera_mark(camera.serial)}, the {side} one of {path}; give the other --side or the rig of this camera"
         )
     focal_px = camera.focal_px[0] / sampling.step_px[0]
     return HciLengths(

@@ -9,6 +9,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from lfstereo.container.serials import camera_mark
+
 if TYPE_CHECKING:
     from lfstereo.container.describe import Description
     from lfstereo.container.metadata import FrameMetadata
@@ -70,7 +72,7 @@ def _rows(m: FrameMetadata) -> Iterator[tuple[str, str]]:
     pitch_px = m.lenslets.pitch_m / m.pixel_pitch_m
     exposure = "" if m.exposure_s is None else f", {1e3 * m.exposure_s:.3g} ms"
     cct = "" if m.awb_cct_k is None else f" ({m.awb_cct_k:.0f} K)"
-    yield "camera", f"{m.make} {m.model}, serial {m.serial or 'not told'}, firmware {m.firmware or 'not told'}"
+    yield "camera", f"{m.make} {m.model}, serial {_serial(m.serial)}, firmware {m.firmware or 'not told'}"
     yield "taken", m.captured_at or "not told"
     yield "frame", f"{m.width} x {m.height} px, {m.bits_per_pixel} bits {m.endianness}-endian, Bayer {m.bayer}"
     yield "levels", f"black {_four(m.black)}, white {_four(m.white)} (r, gr, gb, b)"
@@ -88,3 +90,7 @@ def _rows(m: FrameMetadata) -> Iterator[tuple[str, str]]:
 
 def _four(values: tuple[float, float, float, float]) -> str:
     return " ".join(f"{value:.4g}" for value in values)
+
+
+def _serial(serial: str) -> str:
+    return f"{serial} (mark {camera_mark(serial)})" if serial else "not told"

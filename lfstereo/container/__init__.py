@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import logging
+
 from lfstereo.container.capture import Capture, read_capture
 from lfstereo.container.format import Container
 from lfstereo.container.metadata import FrameMetadata
@@ -9,3 +11,5 @@ from lfstereo.container.reader import read_container
 from lfstereo.container.writer import write_capture
 
 __all__ = ["Capture", "Container", "FrameMetadata", "read_capture", "read_container", "write_capture"]
+
+logging.getLogger("tifffile").addHandler(logging.NullHandler())  # what is wrong with a file is said once, by an error

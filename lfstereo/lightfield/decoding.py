@@ -8,6 +8,7 @@ import numpy as np
 
 from lfstereo.arrays import Float32, UInt16
 from lfstereo.container.capture import Capture
+from lfstereo.container.serials import camera_mark, same_camera
 from lfstereo.develop.develop import develop, develop_mosaic, output_matrix
 from lfstereo.develop.shading import shading_from_photograph, shading_from_white_image
 from lfstereo.errors import AssetError, ConfigError
@@ -196,10 +197,10 @@ def _refuse_other_camera(capture: Capture, white: Capture) -> None:
             f"as {capture.source}; give the white image of the same camera"
         )
     ours, theirs = capture.metadata.serial, white.metadata.serial
-    if ours and theirs and ours != theirs:
+    if not same_camera(ours, theirs):
         raise AssetError(
-            f"{white.source}: found a white image of serial {theirs}, expected {ours} as {capture.source}; give the "
-            "white image of the same camera"
+            f"{white.source}: found a white image of camera {camera_mark(theirs)}, expected {camera_mark(ours)} as "
+            f"{capture.source}; give the white image of the same camera"
         )
 
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from lfstereo.container.serials import camera_mark, same_camera
 from lfstereo.errors import AssetError, ShapeError
 from lfstereo.lightfield.field import LightField
 from lfstereo.rig.geometry import Side
-from lfstereo.rig.rig import PlenopticCamera
+from lfstereo.rig.rig import PlenopticCamera, StereoRig
 from lfstereo.rig.view_maps import VIEW_PIXELS
 
 _PITCH_TOLERANCE = 5e-4
@@ -31,10 +32,11 @@ def check_camera(light_field: LightField, camera: PlenopticCamera, side: Side, a
     ShapeError
         If the light field does not cover the sensor that the rig speaks of.
     """
-    if not any_camera and camera.serial and light_field.serial and camera.serial != light_field.serial:
+    if not any_camera and not same_camera(camera.serial, light_field.serial):
         raise AssetError(
-            f"{light_field.source}: taken by camera {light_field.serial}, but the rig's {side} camera is "
-            f"{camera.serial}; swap the captures, give the rig of these cameras, or accept it with --any-camera"
+            f"{light_field.source}: taken by camera {camera_mark(light_field.serial)}, but the rig's {side} camera is "
+            f"{camera_mark(camera.serial)}; swap the captures, give the rig of these cameras, or accept it with "
+            "--any-camera"
         )
     sampling = light_field.sampling or VIEW_PIXELS
     covered = [n * step for n, step in zip(light_field.views.shape[3:1:-1], sampling.step_px, strict=True)]
@@ -75,3 +77,10 @@ def check_lens(light_field: LightField, camera: PlenopticCamera, side: Side) -> 
             f"{grid.step_px[1]:.4f} px and {grid.rotation_rad * 1e3:.3f} mrad; give the white images of its zoom, "
             "calibrate again, or accept it with --any-zoom"
         )
+
+
+def side_of(serial: str, rig: StereoRig) -> Side | None:
+    """Return the side of the rig whose camera has a serial number or mark; ``None`` where none has it, or both."""
+    cameras: tuple[tuple[Side, PlenopticCamera], ...] = (("left", rig.left), ("right", rig.right))
+    sides = [side for side, camera in cameras if serial and camera.serial and same_camera(serial, camera.serial)]
+    return sides[0] if len(sides) == 1 else None

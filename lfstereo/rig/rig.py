@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -11,11 +11,15 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from lfstereo.arrays import Float64
+from lfstereo.container.fields import LONGEST_TEXT
+from lfstereo.container.serials import camera_mark
 from lfstereo.errors import ConfigError
 from lfstereo.options import read_toml, toml_value
 from lfstereo.outputs import atomic_file
 
 FORMAT = "lfstereo rig 1"
+_LARGEST = 1e9
+"""No length in px or m comes near it."""
 Pair = tuple[float, float]
 Triple = tuple[float, float, float]
 Five = tuple[float, float, float, float, float]
@@ -60,8 +64,8 @@ class PlenopticCamera:
     pupil_m_per_px: float
     """Metres on the pupil per sensor px of offset inside a micro-image."""
     distortion: Five = (0.0, 0.0, 0.0, 0.0, 0.0)
-    """k1, k2, k3, b1, b2: how the lens bends the ideal directions ``(x - cx)/fx``; see
-    :func:`lfstereo.rig.distortion.distort`."""
+    """k1, k2, k3, b1, b2: where the lens, sharp on the plane of zero slope, moves the ideal picture ``(x - cx)/fx``;
+    see :func:`lfstereo.rig.distortion.distort`."""
     zoom_step: int | None = None
     """State of the zoom lens that this holds for, as the camera writes it; ``None``: not known."""
     focus_step: int | None = None
@@ -104,6 +108,12 @@ class StereoRig:
         return math.sqrt(sum(c * c for c in self.translation_m))
 
 
+def without_serials(rig: StereoRig) -> StereoRig:
+    """Return a rig that knows its cameras by their marks (`camera_mark`)."""
+    left, right = (replace(camera, serial=camera_mark(camera.serial)) for camera in (rig.left, rig.right))
+    return replace(rig, left=left, right=right)
+
+
 def write_rig(path: Path, rig: StereoRig, force: bool = False) -> None:
     """Write a rig file: TOML, metres and radians, px of the raw sensor.
 
@@ -138,7 +148,7 @@ def read_rig(path: Path) -> StereoRig:
     table = read_toml(path)
     if table.get("format") != FORMAT:
         raise ConfigError(
-            f"{path}: format is {table.get('format')!r}, expected {FORMAT!r}; give a rig file written by lfstereo"
+            f"{path}: format is {repr(table.get('format'))[:60]}, expected {FORMAT!r}; give a rig file of lfstereo"
         )
     transform = _table(table, "right_from_left", path)
     near, far = _numbers(table, "near_m", 1, path)[0], _numbers(table, "far_m", 1, path)[0]
@@ -161,8 +171,8 @@ def read_rig(path: Path) -> StereoRig:
 
 def _camera(table: dict[str, Any], where: str) -> PlenopticCamera:
     serial = table.get("serial", "")
-    if not isinstance(serial, str):
-        raise ConfigError(f"{where}: serial = {serial!r}, expected text in quotes")
+    if not isinstance(serial, str) or len(serial) > LONGEST_TEXT or not serial.isprintable():
+        raise ConfigError(f"{where}: serial = {repr(serial)[:60]}, expected text in quotes")
     width, height = _numbers(table, "sensor_px", 2, where)
     fx, fy = _numbers(table, "focal_px", 2, where)
     if min(width, height, fx, fy) <= 0:
@@ -196,9 +206,9 @@ def _grid(table: dict[str, Any], where: str) -> SensorGrid | None:
 
 def _step(table: dict[str, Any], name: str, where: str) -> int | None:
     found = table.get(name)
-    if found is not None and (isinstance(found, bool) or not isinstance(found, int)):
+    if found is not None and (isinstance(found, bool) or not isinstance(found, int) or abs(found) > _LARGEST):
         raise ConfigError(
-            f"{where}: {name} = {found!r}, expected a whole number; leave the line out if it is not known"
+            f"{where}: {name} = {repr(found)[:60]}, expected a whole number; leave the line out if it is not known"
         )
     return found
 
@@ -220,7 +230,7 @@ def _positive(table: dict[str, Any], name: str, where: Path | str) -> float:
 def _numbers(table: dict[str, Any], name: str, count: int, where: Path | str) -> tuple[float, ...]:
     found = table.get(name)
     values = found if isinstance(found, list) else [found]
-    good = [float(v) for v in values if isinstance(v, int | float) and not isinstance(v, bool) and math.isfinite(v)]
+    good = [float(v) for v in values if isinstance(v, int | float) and not isinstance(v, bool) and abs(v) <= _LARGEST]
     if len(good) != len(values) or len(good) != count:
-        raise ConfigError(f"{where}: {name} = {found!r}, expected {count} finite number{'s' * (count > 1)}")
+        raise ConfigError(f"{where}: {name} = {repr(found)[:60]}, expected {count} finite number{'s' * (count > 1)}")
     return tuple(good)

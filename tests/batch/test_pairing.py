@@ -136,7 +136,7 @@ def test_serial_and_time_with_a_clock_that_is_wrong(tmp_path: Path, rig: StereoR
     left = leftover(found)
     assert {left[f"L/IMG_{n}.LFR"][0] for n in (4, 5)} == {"ambiguous"}, "one second apart, within the tolerance of two"
     assert left["L/IMG_9.LFR"][1] == "no capture of the other camera within 2 s, clocks +73.3 s apart"
-    assert "taken by camera OTHER" in left["L/IMG_10.LFR"][1]
+    assert "taken by camera #1e8b" in left["L/IMG_10.LFR"][1]
     assert left["R/IMG_60.LFR"][1] == "its metadata tell no capture time"
     assert left["R/IMG_70.LFR"][0] == "unreadable"
 

@@ -157,7 +157,7 @@ def test_refine_refuses_captures_that_do_not_fit(
     left, right = str(photographs / "0_left.h5"), str(photographs / "0_right.h5")
     refine = ["calibrate", "--refine", str(photographs / "rig.toml")]
     assert main([*refine, right, left]) == 3
-    assert "taken by camera R, but the rig's left camera is L" in capsys.readouterr().err
+    assert "taken by camera #be43, but the rig's left camera is #304b" in capsys.readouterr().err
     assert main([*refine, left, right, left]) == 3
     assert "found 3 captures, expected left and right in turn" in capsys.readouterr().err
     assert main([*refine, left, str(tmp_path / "none.h5")]) == 3
