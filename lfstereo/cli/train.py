@@ -32,6 +32,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--minutes", type=float, nargs="+", help="end each run after this much training time [min]")
     parser.add_argument("--resume", action="store_true", help="go on from the checkpoints in the folder")
     parser.add_argument("--pool", help="folder of rendered stacks, in place of the recipe's")
+    parser.add_argument("--fronts", help="folder that the stage 'fronts' filled, in place of the recipe's")
     parser.add_argument("--start-from", nargs="*", metavar="PART=FOLDER", help="in place of the recipe's start_from")
     parser.add_argument("--device", choices=("auto", "cpu", "cuda"), default="auto", help="where to train")
 
@@ -71,7 +72,8 @@ def _replaced(recipe: Recipe, arguments: argparse.Namespace, made: list[str]) ->
     import dataclasses
 
     given = recipe.start_from if arguments.start_from is None else tuple(arguments.start_from)
-    return dataclasses.replace(recipe, pool=arguments.pool or recipe.pool, start_from=(*given, *made))
+    pool, fronts = arguments.pool or recipe.pool, arguments.fronts or recipe.fronts
+    return dataclasses.replace(recipe, pool=pool, fronts=fronts, start_from=(*given, *made))
 
 
 def _train(

@@ -57,6 +57,18 @@ class BinocularArchitecture:
 
 
 @dataclass(frozen=True, slots=True)
+class Seen:
+    """What the two eyes tell before the cues meet."""
+
+    focused: Focused
+    """Left eye."""
+    other: Tensor | None
+    """``(1, 3, H, W)`` sharp image of the right eye, if there is one."""
+    matched: Matched
+    """Descriptors of both."""
+
+
+@dataclass(frozen=True, slots=True)
 class Front:
     """What stands before the refinement."""
 
@@ -97,25 +109,31 @@ class BinocularNet(nn.Module):
     @torch.no_grad()
     def front(self, left: Tensor, right: Tensor | None, foci: Tensor, use_focus: bool = True) -> Front:
         """Score, match, aggregate; parameters as for :meth:`forward`."""
-        focused = self.slices(left)
-        other = None if right is None else self.slices(right).sharp
-        use_focus = (use_focus or right is None) and left.shape[1] > 1
-        readings = self._readings(focused, other, foci, use_focus)
-        focus = focus_disparity(focused.scores, foci) if use_focus else None
-        clues, offers = clue_maps(focused.sharp, readings, focus, other)
-        return Front(clues, offers, focused.sharp)
+        return self.gather(self.look(left, right), foci, use_focus)
 
-    def _readings(self, focused: Focused, other: Tensor | None, foci: Tensor, use_focus: bool) -> Tensor:
-        """``(1, 6, H, W)`` read out of the aggregated volume."""
-        sharp = focused.sharp
+    @torch.no_grad()
+    def look(self, left: Tensor, right: Tensor | None) -> Seen:
+        """Score the slices, make the sharp images and describe their pixels."""
+        focused = self.slices(left)
+        if right is None:
+            return Seen(focused, None, None)
+        other = self.slices(right).sharp
+        described, sharpness = self.descriptors(torch.cat((focused.sharp, other)))
+        return Seen(focused, other, (described[0], described[1], sharpness[0, 0]))
+
+    @torch.no_grad()
+    def gather(self, seen: Seen, foci: Tensor, use_focus: bool = True, use_match: bool = True) -> Front:
+        """Put the cues that are wanted, and there, into one volume, aggregate it and read it out."""
+        sharp = seen.focused.sharp
+        other, matched = (seen.other, seen.matched) if use_match else (None, None)
+        use_focus = (use_focus or matched is None) and seen.focused.scores.shape[1] > 1
         bins = max(int(float(foci.max())) + 1 + _BEYOND_PX, _FEWEST_BINS)
-        matched = None
-        if other is not None:
-            described, sharpness = self.descriptors(torch.cat((sharp, other)))
-            matched = (described[0], described[1], sharpness[0, 0])
-        scores = focused.scores[0] if use_focus else None
+        scores = seen.focused.scores[0] if use_focus else None
         read = _compiled_readings if sharp.device.type == "cpu" and find_spec("numba") else _torch_readings
-        return read(matched, scores, foci, bins, sharp[0].mean(0), self.penalties)[None]
+        readings = read(matched, scores, foci, bins, sharp[0].mean(0), self.penalties)[None]
+        focus = focus_disparity(seen.focused.scores, foci) if use_focus else None
+        clues, offers = clue_maps(sharp, readings, focus, other)
+        return Front(clues, offers, sharp)
 
 
 def _torch_readings(

@@ -14,8 +14,12 @@ from lfstereo.network.penalties import Penalties
 _FAR = 1e9
 
 
+Matched = tuple[Tensor, Tensor, Tensor] | None
+"""Left and right descriptors ``(C, H, W)`` and the sharpness ``(H, W)``; ``None`` without the stereo cue."""
+
+
 def volume_energy(
-    descriptors: tuple[Tensor, Tensor, Tensor] | None,
+    descriptors: Matched,
     scores: Tensor | None,
     foci: Tensor,
     bins: int,

@@ -9,8 +9,9 @@ from lfstereo.conventions import DISPARITY_RANGE_PX
 from lfstereo.network.binocular_net import BinocularNet
 from lfstereo.network.descriptor_net import row_logits
 from lfstereo.training.batches import Batch
-from lfstereo.training.fronts import FrontBatch
+from lfstereo.training.fronts import CHANCES, CUES, FrontBatch
 from lfstereo.training.losses import bin_cross_entropy, image_loss
+from lfstereo.training.samples import SLICE_DISPARITIES
 
 MATCH_ROWS = 24
 """Rows of every picture on which the match is judged."""
@@ -95,8 +96,13 @@ def vary_slices(stack: Tensor, draw: torch.Generator) -> tuple[Tensor, int, int]
     return torch.cat((both, stack[:, -1:]), dim=1), 0, count - 1
 
 
-def refine_loss(network: BinocularNet, batch: FrontBatch) -> Tensor:
-    """Error of the disparity, plain and bounded, of its earlier stages, and of the error that is foretold."""
+def refine_loss(network: BinocularNet, batch: FrontBatch | Batch) -> Tensor:
+    """Error of the disparity, plain and bounded, of its earlier stages, and of the error that is foretold.
+
+    Stacks are scored, matched and aggregated here; fronts that were made before only need to be refined.
+    """
+    if isinstance(batch, Batch):
+        batch = _fronts_of(network, batch)
     refined = network.refine(batch.clues, batch.offers)
     wanted = batch.disparity * DISPARITY_RANGE_PX
     error = (refined.disparity - wanted).abs()
@@ -106,6 +112,19 @@ def refine_loss(network: BinocularNet, batch: FrontBatch) -> Tensor:
     foretold = error.detach().clamp(max=50) * torch.exp(-refined.log_error) + refined.log_error
     total: Tensor = (loss + _ERROR_WEIGHT * foretold) * batch.valid
     return total.sum() / batch.valid.sum().clamp(min=1)
+
+
+def _fronts_of(network: BinocularNet, batch: Batch) -> FrontBatch:
+    """Make the fronts of a batch of stacks, some of them with one cue alone."""
+    draw = _generator(batch)
+    foci = torch.from_numpy(SLICE_DISPARITIES).to(batch.disparity.device)
+    fronts = []
+    for index in range(len(batch.disparity)):
+        cue = CUES[int(torch.multinomial(torch.tensor(CHANCES), 1, generator=draw))]
+        right = None if cue == "focus" else batch.right_stack[index : index + 1]
+        fronts.append(network.front(batch.left_stack[index : index + 1], right, foci, cue != "stereo"))
+    clues, offers = (torch.cat([getattr(front, name) for front in fronts]) for name in ("clues", "offers"))
+    return FrontBatch(clues, offers, batch.disparity, batch.valid)
 
 
 def _robust(error: Tensor) -> Tensor:

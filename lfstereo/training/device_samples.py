@@ -14,8 +14,9 @@ from lfstereo.conventions import DISPARITY_RANGE_PX
 from lfstereo.network.encoding import GAMMA, WHITE_PERCENTILE
 from lfstereo.training import samples
 from lfstereo.training.device_tracing import Frame, render_views
+from lfstereo.training.rooms import SCENES
 from lfstereo.training.samples import LEAST_BLUR_PX, PUPIL_POINTS, SLICE_DISPARITIES, pupil_points
-from lfstereo.training.scenes import Scene, random_scene
+from lfstereo.training.scenes import Scene
 
 _DARK = 1e-5
 
@@ -71,7 +72,7 @@ def draw_faults(rng: np.random.Generator, height: int, width: int) -> Faults:
 
 @torch.no_grad()
 def device_stack_sample(
-    seed: tuple[int, ...], textures: Tensor, bank: Float32, height: int, width: int
+    seed: tuple[int, ...], textures: Tensor, bank: Float32, height: int, width: int, kind: str = "layers"
 ) -> DeviceSample:
     """Render a pair of focal stacks focused at 100 to 0 px.
 
@@ -85,9 +86,11 @@ def device_stack_sample(
         The same textures on the host; only their number is used there.
     height, width
         Size in px.
+    kind
+        Of scene, see :data:`lfstereo.training.rooms.SCENES`.
     """
     rng = np.random.default_rng(seed)
-    scene = random_scene(rng, bank, height, width)
+    scene = SCENES[kind](rng, bank, height, width)
     faults = draw_faults(rng, height, width)
     noise = torch.Generator(textures.device).manual_seed(int(rng.integers(2**31)))
     eyes = [np.array([[eye, 0.0]], np.float32) for eye in (0, 1)]

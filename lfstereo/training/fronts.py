@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from lfstereo.errors import ConfigError
-from lfstereo.network.binocular_net import BinocularNet, Front
+from lfstereo.network.binocular_net import BinocularNet
 from lfstereo.network.blocks import channels_last, fold_batch_norms
 from lfstereo.network.refine_net import CLUES, OFFERS
 from lfstereo.progress import Progress, silent
@@ -22,7 +22,8 @@ from lfstereo.training.samples import SLICE_DISPARITIES
 
 CUES = ("both", "stereo", "focus")
 """What the front was given."""
-_CHANCES = (0.6, 0.2, 0.2)
+CHANCES = (0.6, 0.2, 0.2)
+"""How often each is learnt from."""
 _MAPS = CLUES + OFFERS
 
 
@@ -75,17 +76,14 @@ def fill_fronts(folder: Path, recipe: Recipe, network: BinocularNet, progress: P
     for index in order:
         if ready[index]:
             continue
-        for number, cue in enumerate(CUES):
-            front = _front(network, pool, int(index), cue)
-            maps[index, number] = torch.cat((front.clues, front.offers), dim=1)[0].numpy()
+        stacks = torch.from_numpy(pool.stacks[index].astype(np.float32) / 255).permute(0, 1, 4, 2, 3)
+        with torch.inference_mode():
+            seen = network.look(stacks[:1], stacks[1:])
+            for number, cue in enumerate(CUES):
+                front = network.gather(seen, _FOCI, cue != "stereo", cue != "focus")
+                maps[index, number] = torch.cat((front.clues, front.offers), dim=1)[0].numpy()
         ready[index] = 1
         progress(int(ready.sum()), len(order))
-
-
-def _front(network: BinocularNet, pool: Pool, index: int, cue: str) -> Front:
-    left, right = (torch.from_numpy(s.astype(np.float32) / 255).permute(0, 3, 1, 2)[None] for s in pool.stacks[index])
-    with torch.inference_mode():
-        return network.front(left, None if cue == "focus" else right, _FOCI, cue != "stereo")
 
 
 _FOCI = torch.from_numpy(SLICE_DISPARITIES)
@@ -122,7 +120,7 @@ class FrontBatches:
         height, width = self.pool.disparity.shape[2:]
         h, w = self.recipe.crop or (height, width)
         y, x = int(rng.integers(0, height - h + 1)), int(rng.integers(0, width - w + 1))
-        cue = int(rng.choice(len(CUES), p=_CHANCES))
+        cue = int(rng.choice(len(CUES), p=CHANCES))
         maps = self.maps[index, cue, :, y : y + h, x : x + w].astype(np.float32)
         disparity = self.pool.disparity[index, :1, y : y + h, x : x + w].astype(np.float32)
         valid = self.pool.valid[index, :1, y : y + h, x : x + w] > 0

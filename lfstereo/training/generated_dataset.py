@@ -81,10 +81,10 @@ def generate(
     return Synthesis(tuple(written), tuple(kept), ())
 
 
-def dual_stack_of(name: str, sample: StackSample) -> DualStack:
-    """Bring a training sample to linear light; what lies outside 0 to 100 px counts as not known."""
+def dual_stack_of(name: str, sample: StackSample, foci: Float32 = SLICE_DISPARITIES) -> DualStack:
+    """Bring a sample with slices at ``foci`` (px) to linear light; what lies outside 0 to 100 px is not known."""
     left, right = (
-        FocalStack(decode(sample.stacks[eye], 1.0), SLICE_DISPARITIES, sample.aperture_ratio, f"{name} {side}")
+        FocalStack(decode(sample.stacks[eye], 1.0), foci, sample.aperture_ratio, f"{name} {side}")
         for eye, side in enumerate(("left", "right"))
     )
     sharp = decode(sample.sharp, 1.0)

@@ -16,10 +16,10 @@ from torch import Tensor
 
 from lfstereo.arrays import Float32
 from lfstereo.progress import Progress, silent
+from lfstereo.training.atlas import scene_bank
 from lfstereo.training.batches import Batch, draw_variation
 from lfstereo.training.device_samples import DeviceSample, device_stack_sample
 from lfstereo.training.pool import DISPARITY_STEPS_PER_PX
-from lfstereo.training.textures import texture_bank
 
 PER_BANK = 256
 """Samples that share a bank of textures."""
@@ -37,6 +37,10 @@ class RingSize:
     fresh: float
     """New samples per step."""
     textures: int
+    scenes: str = "layers"
+    """Kind of scene, see :data:`lfstereo.training.rooms.SCENES`."""
+    atlas: str = ""
+    """Folder of photographs for the textures of rooms."""
 
 
 class SampleRing:
@@ -75,7 +79,7 @@ class SampleRing:
     def _put(self, number: int) -> None:
         bank, textures = self._textures(number // PER_BANK)
         sample: DeviceSample = device_stack_sample(
-            (self.seed, 5, number), textures, bank, self.size.height, self.size.width
+            (self.seed, 5, number), textures, bank, self.size.height, self.size.width, self.size.scenes
         )
         place = number % self.size.count
         self.stacks[place] = (sample.stacks * 255).round().byte()
@@ -86,7 +90,7 @@ class SampleRing:
 
     def _textures(self, number: int) -> tuple[Float32, Tensor]:
         if self._bank is None or self._bank[0] != number:
-            bank = texture_bank(self.seed * 100003 + number, self.size.textures)
+            bank = scene_bank(self.size.scenes, self.seed * 100003 + number, self.size.textures, self.size.atlas)
             self._bank = (number, bank, torch.from_numpy(bank).to(self.device))
         return self._bank[1], self._bank[2]
 

@@ -43,7 +43,7 @@ class StackSample:
     """Two focal stacks of a scene and what they should be turned into."""
 
     stacks: Float32
-    """``(2, 16, H, W, 3)`` left and right, display-referred RGB, 0 to 1."""
+    """``(2, K, H, W, 3)`` left and right, display-referred RGB, 0 to 1."""
     sharp: Float32
     """``(2, H, W, 3)`` all-in-focus images without noise."""
     disparity: Float32
@@ -100,8 +100,9 @@ def stack_sample(
     width: int,
     aperture_ratio: float | None = None,
     kind: str = "layers",
+    foci: Float32 = SLICE_DISPARITIES,
 ) -> StackSample:
-    """Render a pair of focal stacks focused at 100 to 0 px.
+    """Render a pair of focal stacks.
 
     Parameters
     ----------
@@ -115,6 +116,8 @@ def stack_sample(
         Blur diameter per px of disparity; drawn from 0.05 to 0.4, mostly 0.08 to 0.2, where not given.
     kind
         Of scene, see :data:`lfstereo.training.rooms.SCENES`.
+    foci
+        ``(K,)`` disparities (px) of the slices, falling.
     """
     scene = SCENES[kind](rng, textures, height, width)
     ratio = aperture_ratio or draw_aperture_ratio(rng)
@@ -123,7 +126,9 @@ def stack_sample(
     level = draw_noise(rng)
     exposure = exposure_of(*(v.image for v in sharp_views))
     noise = rng.standard_normal(6 * (height + 64) * (width + 64), dtype=np.float32)
-    linear = [_stack(rng, scene, eye, ratio, misalignment[eye], gains[eye] / exposure, level, noise) for eye in (0, 1)]
+    linear = [
+        _stack(rng, scene, eye, ratio, misalignment[eye], gains[eye] / exposure, level, noise, foci) for eye in (0, 1)
+    ]
     blur, margin = draw_blur_px(rng), draw_margins(rng, height, width)
     white = exposure_of(*linear)
     stacks = np.stack([[encode(_blur(s, blur), white) for s in stack] for stack in linear])
@@ -142,19 +147,20 @@ def _stack(
     gain: Float32,
     noise_level: tuple[float, float],
     noise: Float32,
+    foci: Float32,
 ) -> Float32:
     from lfstereo.training.tracing import shear_add  # compiled, and only needed where scenes are rendered here
 
     points = pupil_points(PUPIL_POINTS, rng.uniform(0, 2 * np.pi)) * (ratio / 2)
     margin = int(np.ceil(np.abs(points).max() * DISPARITY_RANGE_PX)) + 2
-    total = np.zeros((SLICES_DEFAULT, scene.height, scene.width, 3), np.float32)
+    total = np.zeros((len(foci), scene.height, scene.width, 3), np.float32)
     peak, read = noise_level
     for x, y in points:
         view = render(scene, eye + float(x), float(y), margin=margin, shift_y=shift_y).image * gain
         start = int(rng.integers(0, noise.size - view.size))
         grain = noise[start : start + view.size].reshape(view.shape)
         view = (view + np.sqrt(view / peak + read**2) * grain).astype(np.float32)
-        shear_add(view, SLICE_DISPARITIES * x, SLICE_DISPARITIES * y, margin, total)
+        shear_add(view, foci * x, foci * y, margin, total)
     return total / np.float32(len(points))
 
 

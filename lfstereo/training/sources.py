@@ -52,7 +52,9 @@ def takes_ring(recipe: Recipe, worker: Worker) -> bool:
 
 
 def _ring_source(recipe: Recipe, worker: Worker, rings: Rings, progress: Progress) -> Callable[[int], Batch]:
-    size = RingSize(recipe.ring, recipe.height, recipe.width, recipe.fresh, recipe.textures)
+    size = RingSize(
+        recipe.ring, recipe.height, recipe.width, recipe.fresh, recipe.textures, recipe.scenes, recipe.atlas
+    )
     seed = recipe.seed + _RANKS * worker.rank
     if (size, seed) not in rings:
         rings.clear()

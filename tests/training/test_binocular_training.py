@@ -98,6 +98,16 @@ def test_a_few_steps_reduce_the_loss(stage: str, pool: Path, fronts: Path) -> No
     assert changed == set(TRAINED[stage])
 
 
+def test_refinement_learns_from_stacks_too(pool: Path) -> None:
+    """On a graphics card nothing is cached: the loss makes its own fronts, of the same numbers each time."""
+    torch.manual_seed(0)
+    network = BinocularNet(SMALL)
+    select_parts(network, "refine")
+    batch = PoolBatches(open_pool(pool, 3, 64, 128, 1), 1, 2)(0)
+    first, again = (LOSSES["refine"](network, batch) for _ in range(2))
+    assert torch.isfinite(first) and torch.equal(first, again)
+
+
 def test_fronts_are_cached_whole_and_cropped_alike(pool: Path, fronts: Path) -> None:
     opened = open_pool(pool, 3, 64, 128, 1)
     source = FrontBatches(opened, recipe("refine", fronts=str(fronts), crop=(32, 96)))
@@ -127,10 +137,9 @@ def test_recipes_from_a_pool_to_a_model(pool: Path, tmp_path: Path) -> None:
     for stage in ("match", "slices", "fronts", "refine"):
         paths.append(tmp_path / f"{stage}.toml")
         text = f'stage = "{stage}"\npool = "{pool}"\n'
-        if stage == "refine":
-            text += f'fronts = "{tmp_path / "runs" / "fronts"}"\n'
         paths[-1].write_text(text + RECIPE)
     words = ["train", *map(str, paths), "-o", str(tmp_path / "runs"), "--device", "cpu"]
+    words += ["--fronts", str(tmp_path / "runs" / "fronts")]
     assert main(words) == 0
     parts = {"descriptors": "match", "slices": "slices", "refine": "refine"}
     sources = [f"{part}={tmp_path / 'runs' / run}" for part, run in parts.items()]

@@ -14,6 +14,7 @@ import torch
 from lfstereo.cli.main import main
 from lfstereo.errors import AssetError, ConfigError
 from lfstereo.network.bdff_net import Architecture, BdffNet, paper_architecture
+from lfstereo.network.binocular_net import BinocularArchitecture
 from lfstereo.network.focus_net import FocusNet
 from lfstereo.network.stereo_net import Prediction
 from lfstereo.network.weights import load_model
@@ -174,6 +175,16 @@ def test_all_shipped_recipes_can_be_read() -> None:
         assert architecture == Architecture()
     published = sorted((asset_folder("models") / "recipes" / "paper").glob("*.toml"))
     assert [read_recipe(path)[1] for path in published] == [paper_architecture()] * 6
+    binocular = sorted((asset_folder("models") / "recipes" / "binocular").rglob("*.toml"))
+    assert {read_recipe(path)[1] for path in binocular} == {
+        Architecture(),
+        BinocularArchitecture(),
+    }  # the pool has none
+    assert [read_recipe(path)[0].stage for path in binocular if path.parent.name == "card"] == [
+        "match",
+        "slices",
+        "refine",
+    ]
 
 
 def test_train_command_then_publish_then_evaluate(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
