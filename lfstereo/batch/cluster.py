@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import asyncio
 import secrets
 from collections.abc import Callable
-from concurrent.futures import Executor
+from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -23,6 +24,7 @@ Where a GPU is declared but no CPU, workers with a GPU may be given the other st
 _CONNECT_S = 20
 _FIRST_WORKER_S = 60
 _CLOSE_S = 5
+_FETCH_S = 60
 _WAITING_PER_WORKER = 1
 """Jobs beyond the running ones that wait at the scheduler, so that no worker is idle for a round trip."""
 
@@ -80,10 +82,10 @@ class ClusterCrew:
         """Do nothing: a worker ends itself, and the scheduler drops one that does not answer (``worker-ttl``)."""
 
     def lost_a_worker(self, error: Exception, /) -> bool:
-        """Return whether Dask gave a call up because workers died that held it, be it that it only waited there."""
+        """Return whether its worker died, or several on which it may only have waited."""
         from distributed.scheduler import KilledWorker
 
-        return isinstance(error, KilledWorker)
+        return isinstance(error, (BrokenExecutor, KilledWorker))
 
     def close(self, _: bool, /) -> None:
         """Leave the cluster; what it still works on for us it drops, or it throws the result away."""
@@ -99,9 +101,7 @@ class ClusterCrew:
         return sum(resource is None or resource in worker["resources"] for worker in self._workers().values())
 
     def _executor(self, resource: str | None) -> Executor:
-        wanted = {} if resource is None else {"resources": {resource: 1}}
-        executor: Executor = self._client.get_executor(pure=False, **wanted)
-        return executor
+        return ClusterExecutor(self._client, {} if resource is None else {resource: 1})
 
     def _capacity(self, resource: str | None) -> Callable[[], int]:
         workers = self._count(resource)
@@ -139,6 +139,59 @@ class ClusterCrew:
                 raise InputError(
                     f"{worker}: found lfstereo {version}, expected {__version__} as here; install the same there"
                 )
+
+
+class ClusterExecutor(Executor):
+    """The workers of a client that have some resources.
+
+    ``Client.get_executor`` gives futures that fetch each result as soon as there is one, and that hang, fail or print a
+    traceback if its worker is lost meanwhile. These fetch it when they are asked, which the answers on the storage make
+    needless.
+    """
+
+    def __init__(self, client: Any, resources: dict[str, int]) -> None:
+        self._client, self._resources = client, resources
+
+    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+        """Hand a call to a worker."""
+        task = self._client.submit(fn, *args, **kwargs, pure=False, resources=self._resources or None)
+        call = ClusterCall(task)
+        task.add_done_callback(call.settle)
+        return call
+
+
+class ClusterCall(Future[Any]):
+    """A call that is done when the scheduler says so, and whose result stays where it is."""
+
+    def __init__(self, task: Any) -> None:
+        super().__init__()
+        self._task = task
+
+    def settle(self, task: Any) -> None:
+        """Take over how a task ended."""
+        if task.status not in ("cancelled", "error"):
+            self.set_result(None)
+            return
+        error: BaseException = CancelledError()
+        with suppress(Exception):  # the client may be closed by now
+            error = task.exception(_FETCH_S) or error
+        self.set_exception(error)
+
+    def result(self, timeout: float | None = None) -> Any:
+        """Fetch the result.
+
+        Raises
+        ------
+        CancelledError
+            If the scheduler was lost before there was one.
+        BrokenExecutor
+            If it was lost with its worker.
+        """
+        super().result(timeout)
+        try:
+            return self._task.result(_FETCH_S)
+        except (Exception, asyncio.CancelledError) as error:
+            raise BrokenExecutor(f"the result was lost: {error}") from error
 
 
 def look_around(path: str) -> tuple[str, str]:

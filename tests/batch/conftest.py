@@ -19,7 +19,7 @@ from lfstereo.assets import asset_folder
 from lfstereo.batch.record import read_record
 
 HERE = Path(__file__).parent
-PATIENCE_S = 300.0
+PATIENCE_S = 900.0
 """Longest wait for something that is bound to happen, on a busy machine."""
 
 

@@ -138,15 +138,18 @@ def test_two_batches_on_one_folder(site: Any) -> None:
 
 
 def test_shards_work_side_by_side(site: Any) -> None:
-    """Each takes its part and writes its own record; the summary is of both."""
-    site.pairs("ok1", "wait")
-    first = site.start("--shard", "2/2")
-    site.wait_until(lambda: site.note("wait"), "the second shard")
-    code, printed = site.run("--shard", "1/2")
-    assert (code, "1 converted" in printed) == (0, True)
+    """Each takes its part, lets the other's notes be and writes its own record; the summary is of both."""
+    site.pairs("wait", "wait.2")
+    second = site.start("--shard", "2/2")
+    site.worker_at("wait.2", "write results")
+    first = site.start("--shard", "1/2")
+    site.worker_at("wait", "write results")
+    assert site.note("wait.2"), "its name begins with the other's"
     (site.folder / "go").touch()
-    assert site.end_of(first)[0] == 0
-    assert site.states() == {"ok1": "done", "wait": "done"}
+    for batch in (first, second):
+        code, printed = site.end_of(batch)
+        assert (code, "1 converted" in printed) == (0, True), printed
+    assert site.states() == {"wait": "done", "wait.2": "done"}
     assert "not done" not in (site.out / "summary.csv").read_text()
 
 
