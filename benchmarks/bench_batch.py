@@ -2,7 +2,8 @@
 
 Run ``python benchmarks/bench_batch.py SESSION``: a folder with ``captures/``, ``rig.toml`` and ``whites/``, made with
 ``lfstereo simulate`` if it does not exist (one simulated scene under ten capture times). Parts may be run one by one:
-``--part single``, ``batch``, ``cluster``, ``model``; what they measure is kept in ``SESSION/bench.json``.
+``--part single``, ``batch``, ``cluster``, ``model``; what they measure is kept in ``SESSION/bench.json``. The time of
+the processors stands beside the wall time, to tell the work of a pair from what else the machine does.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from __future__ import annotations
 import argparse
 import heapq
 import json
+import resource
 import shutil
 import subprocess
 import sys
@@ -84,27 +86,28 @@ def single(session: Path, _pairs: int, _found: dict[str, Any]) -> dict[str, Any]
     """
     pair = session / "captures" / "scene00"
     words = [*_LFSTEREO, "run", str(pair / "left.LFR"), str(pair / "right.LFR")]
-    first, again = (timed([*words, *places(session, "one")]) for _ in range(2))
-    start = timed([sys.executable, "-c", _START])
+    (first, first_cpu), (again, again_cpu) = (timed([*words, *places(session, "one")]) for _ in range(2))
+    start, _ = timed([sys.executable, "-c", _START])
     print(f"single pair: {first:.1f} s, again {again:.1f} s; start of a worker and its network: {start:.1f} s")
-    return {"single_first_s": first, "single_s": again, "start_s": start}
+    print(f"  of processors: {first_cpu:.1f} s, again {again_cpu:.1f} s")
+    return {"single_first_s": first, "single_s": again, "single_cpu_s": again_cpu, "start_s": start}
 
 
 def batch(session: Path, pairs: int, found: dict[str, Any]) -> dict[str, Any]:
     """Time ``lfstereo batch`` on all pairs."""
-    seconds = timed([*_LFSTEREO, "batch", str(session / "captures"), *places(session, "many")])
-    return {"batch_s": seconds} | report("batch", session / "many", pairs, seconds, found)
+    took = timed([*_LFSTEREO, "batch", str(session / "captures"), *places(session, "many")])
+    return {"batch_s": took[0]} | report("batch", session / "many", pairs, took, found)
 
 
 def cluster(session: Path, pairs: int, found: dict[str, Any]) -> dict[str, Any]:
     """Time the same over a Dask scheduler and two workers on loopback."""
     with dask_on_loopback(session / "dask", 2) as address:
         words = [*_LFSTEREO, "batch", str(session / "captures"), *places(session, "dasked"), "--scheduler", address]
-        seconds = timed(words)
+        took = timed(words)
         overhead = empty_job_s(address, session / "dasked" / "empty.jsonl")
-    report("cluster of 2", session / "dasked", pairs, seconds, found)
+    report("cluster of 2", session / "dasked", pairs, took[:1], found)
     print(f"  an empty job and its line in the record: {overhead * 1e3:.1f} ms")
-    return {"cluster_s": seconds, "scheduler_s": overhead}
+    return {"cluster_s": took[0], "scheduler_s": overhead}
 
 
 def empty_job_s(address: str, record: Path) -> float:
@@ -120,12 +123,15 @@ def empty_job_s(address: str, record: Path) -> float:
         return (time.perf_counter() - started) / _EMPTY_JOBS
 
 
-def report(label: str, out: Path, pairs: int, seconds: float, found: dict[str, Any]) -> dict[str, Any]:
+def report(label: str, out: Path, pairs: int, took: tuple[float, ...], found: dict[str, Any]) -> dict[str, Any]:
     """Print time per pair, its ratio to a single pair, memory over the run; return what the model needs."""
     outcomes = [entry.outcome for entry in read_record(out).entries.values() if entry.outcome.state == "done"]
-    ratio = f", {seconds / pairs / found['single_s']:.2f} of a single pair" if "single_s" in found else ""
-    print(f"{label}: {len(outcomes)} pairs in {seconds:.1f} s, {seconds / pairs:.1f} s per pair{ratio}")
-    print("  peak GiB, pair by pair: " + " ".join(f"{outcome.peak_gib:.2f}" for outcome in outcomes))
+    for kind, single, seconds in zip(("wall", "processors"), ("single_s", "single_cpu_s"), took, strict=False):
+        ratio = f", {seconds / pairs / found[single]:.2f} of a single pair" if single in found else ""
+        print(f"{label}: {len(outcomes)} pairs in {seconds:.1f} s ({kind}), {seconds / pairs:.1f} s per pair{ratio}")
+    for worker in sorted({outcome.workers[-1] for outcome in outcomes}):
+        curve = " ".join(f"{outcome.peak_gib:.2f}" for outcome in outcomes if outcome.workers[-1] == worker)
+        print(f"  peak GiB of {worker}, pair by pair: {curve}")
     stages = {name: [o.seconds.get(name, 0.0) for o in outcomes] for name in outcomes[-1].seconds}
     for name, values in stages.items():
         print(f"  {name:<22}{sum(values) / len(values):>7.2f} s")
@@ -135,11 +141,13 @@ def report(label: str, out: Path, pairs: int, seconds: float, found: dict[str, A
     return {"compute_s": compute, "read_mb": read / 1e6 / len(outcomes), "written_mb": written / 1e6 / len(outcomes)}
 
 
-def timed(words: list[str]) -> float:
-    """Return the wall time of a command."""
-    started = time.perf_counter()
+def timed(words: list[str]) -> tuple[float, float]:
+    """Return the wall time of a command and the processor time of it and its children."""
+    started, before = time.perf_counter(), resource.getrusage(resource.RUSAGE_CHILDREN)
     subprocess.run(words, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    return time.perf_counter() - started
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    cpu = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    return time.perf_counter() - started, cpu
 
 
 @contextmanager
