@@ -39,7 +39,9 @@ def configure(parser: argparse.ArgumentParser) -> None:
         metavar="RIG",
         help="say whether this rig has moved, from ordinary captures, not a target",
     )
-    parser.add_argument("--whites", type=Path, help="folder with the cameras' white images; needed for raw captures")
+    parser.add_argument(
+        "--whites", type=Path, help="folder with the cameras' white images, of raw captures; else those imported before"
+    )
     parser.add_argument(
         "-o",
         "--output",
@@ -52,6 +54,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--any-camera", action="store_true", help="with --refine: accept captures of other cameras")
     parser.add_argument("--config", type=Path, help="TOML file with options; the command line goes before it")
+    parser.add_argument("--keep-serials", action="store_true", help="write camera serial numbers, not only their marks")
     parser.add_argument("--force", action="store_true", help="replace outputs that exist")
     parser.add_argument("--json", action="store_true", help="print the summary as JSON on stdout")
     add_arguments(parser, RigOptions)
@@ -67,7 +70,7 @@ def _calibrate(arguments: argparse.Namespace) -> int:
     from lfstereo.rig.bundle import RigOptions, solve_rig
     from lfstereo.rig.calibration_report import write_report
     from lfstereo.rig.corners import CornerOptions
-    from lfstereo.rig.rig import write_rig
+    from lfstereo.rig.rig import without_serials, write_rig
     from lfstereo.rig.session import see_targets
     from lfstereo.rig.shots import pair_shots
     from lfstereo.rig.target import read_target
@@ -96,7 +99,8 @@ def _calibrate(arguments: argparse.Namespace) -> int:
     with clock.stage("solve") as progress:
         shown = (session.pairs, target.points, session.sizes_px, session.pixel_px)
         solution = solve_rig(*shown, options, progress, session.lenses)
-    write_rig(arguments.output, session.labelled(solution.rig), arguments.force)
+    rig = session.labelled(solution.rig)
+    write_rig(arguments.output, rig if arguments.keep_serials else without_serials(rig), arguments.force)
     write_report(report, solution, target.points, arguments.force)
     files = {"the rig": arguments.output, "this page as one picture": report}
     write_calibration_page(page, solution, session, target.points, files, arguments.force)

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-from lfstereo.arrays import Float32
 from lfstereo.container.capture import Capture, read_capture
-from lfstereo.errors import AssetError, TargetNotFoundError
-from lfstereo.lenslet.grid import LensletGrid
-from lfstereo.lenslet.white import find_white_image
-from lfstereo.lightfield.decoding import calibrate, views_from
+from lfstereo.container.serials import camera_mark, same_camera
+from lfstereo.errors import AssetError, GridFitError, TargetNotFoundError
+from lfstereo.lenslet.drift import measure_drift
+from lfstereo.lenslet.options import GridOptions
+from lfstereo.lightfield.calibration import LensletCalibration, calibrate_photograph, decode_with
 from lfstereo.lightfield.field import LightField
 from lfstereo.lightfield.store import SUFFIXES, read_light_field
 from lfstereo.progress import Progress, silent
@@ -71,13 +71,17 @@ def see_targets(
     target
         The board.
     whites
-        Folder of the cameras' white images, needed for raw captures.
+        Folder of the cameras' white images; ``None``: those imported before.
+
+    Warns
+    -----
+    QualityWarning
+        If no white image fits a raw capture.
 
     Raises
     ------
     AssetError
-        If raw captures come without white images, one side's shots differ in camera, zoom, focus or size, or both
-        sides' were taken by one camera.
+        If one side's shots differ in camera, zoom, focus or size, or both sides' were taken by one camera.
     TargetNotFoundError
         If no shot shows the target to both cameras.
     """
@@ -116,16 +120,16 @@ def see_targets(
 
 def _refuse_one_camera(name: str, seen: Sequence[Sightings]) -> None:
     left, right = seen
-    if left.serial and left.serial == right.serial:
+    if left.serial and right.serial and same_camera(left.serial, right.serial):
         raise AssetError(
-            f"shot {name}: {left.source} and {right.source} were both taken by camera {left.serial}, expected two "
-            "cameras; give each camera's photographs as one side"
+            f"shot {name}: {left.source} and {right.source} were both taken by camera {camera_mark(left.serial)}, "
+            "expected two cameras; give each camera's photographs as one side"
         )
 
 
 @dataclass(slots=True)
 class ShotSide:
-    """One camera's shots: the state that they must share, and grids already fitted."""
+    """One camera's shots: the state that they must share, and the lenslet grid that fitted the last one."""
 
     name: Side
     whites: Path | None
@@ -136,7 +140,7 @@ class ShotSide:
     steps: LensSteps = (None, None)
     grid: SensorGrid | None = None
     lens: ThinLens | None = None
-    grids: dict[str, tuple[LensletGrid, Float32]] = field(default_factory=dict)
+    lenslets: LensletCalibration | None = None
 
     def open(self, path: Path) -> LightField:
         """Decode a capture, or read a light field.
@@ -144,7 +148,7 @@ class ShotSide:
         Raises
         ------
         AssetError
-            If a raw capture comes without white images, or another state of the camera than the first one.
+            If a capture comes from another camera, or another state of the camera, than the first one.
         """
         light_field = self._opened(path)
         if self.grid is None and (sampling := light_field.sampling) is not None:
@@ -155,7 +159,7 @@ class ShotSide:
         if path.suffix.lower() in SUFFIXES:
             light_field = read_light_field(path)
             self.steps = light_field.zoom_step, light_field.focus_step
-            self._agree(path, (light_field.serial, light_field.views.shape[2:4], *self.steps))
+            self._agree(path, (camera_mark(light_field.serial), light_field.views.shape[2:4], *self.steps))
             rows, columns = light_field.views.shape[2:4]
             step = light_field.sampling.step_px if light_field.sampling else (1.0, 1.0)
             self.size_px, self.pixel_px = (round(columns * step[0]), round(rows * step[1])), step[1]
@@ -163,20 +167,17 @@ class ShotSide:
         capture = read_capture(path)
         found = capture.metadata
         self.steps = found.lens.zoom_step, found.lens.focus_step
-        self._agree(path, (found.serial, (found.height, found.width), *self.steps))
-        light_field = self._decoded(capture, path)
+        self._agree(path, (camera_mark(found.serial), (found.height, found.width), *self.steps))
+        light_field = self._decoded(capture)
         self.lens = thin_lens_of_metadata(found)
         self.size_px = (found.width, found.height)
         self.pixel_px = light_field.sampling.step_px[1] if light_field.sampling else 1.0
         return light_field
 
-    def _decoded(self, capture: Capture, path: Path) -> LightField:
-        if self.whites is None:
-            raise AssetError(f"{path}: a raw capture needs the camera's white images; give their folder with --whites")
-        white = find_white_image(self.whites, capture.metadata)
-        if white.source not in self.grids:
-            self.grids[white.source] = calibrate(capture, white)
-        return views_from(capture, *self.grids[white.source])
+    def _decoded(self, capture: Capture) -> LightField:
+        if self.lenslets is None or not _fits(capture, self.lenslets):
+            self.lenslets = calibrate_photograph(capture, self.whites)
+        return decode_with(capture, self.lenslets)
 
     def _agree(self, path: Path, state: tuple[object, ...]) -> None:
         if not self.first:
@@ -188,3 +189,11 @@ class ShotSide:
                     f"{path}: {name} {found}, expected {expected} as {self.first}; all {self.name} shots must be "
                     "taken by one camera without touching zoom and focus; move this one away"
                 )
+
+
+def _fits(capture: Capture, lenslets: LensletCalibration, options: GridOptions = GridOptions()) -> bool:
+    """Return whether a capture's micro-images lie where the grid of an earlier one has them."""
+    try:
+        return measure_drift(capture, lenslets.grid, options).offset_px <= options.largest_offset_px
+    except GridFitError:
+        return False
