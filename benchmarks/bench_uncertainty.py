@@ -1,6 +1,6 @@
 """Compare the stated standard deviations of a calibration with its errors, over many simulated rigs.
 
-Run ``python benchmarks/bench_uncertainty.py [RIGS]`` (two CPU seconds a rig and kind of error; 12 rigs of each kind by
+Run ``python benchmarks/bench_uncertainty.py [RIGS]`` (two CPU seconds a rig and kind of error; 8 rigs of each kind by
 default). Corners are projected through the simulator's lenses, without pictures, and moved at random: each by itself,
 or as neighbours of one shot are, alike. Twelve boards each, lenses bent by 1 % in the corners of the frame.
 """
@@ -29,7 +29,7 @@ QUANTITIES = ("baseline", "turn x", "turn y", "turn z", "focal left", "focal rig
 
 def errors_in_sd(seed: int, errors: CornerErrors) -> Float64:
     """Return the errors of six figures of one calibration over their stated standard deviations."""
-    options = SimulateOptions(seed=seed, boards=12, board_corners=(10, 7), board_square_m=0.02, distortion_k1=-0.1)
+    options = SimulateOptions(seed=seed, boards=12, board_corners=(8, 5), board_square_m=0.025, distortion_k1=-0.1)
     rig, pairs = corner_session(options, errors)
     truth, sizes = rig.stereo, (rig.left.sensor_px, rig.right.sensor_px)
     found = solve_rig(pairs, board_target(options).points, sizes, truth.pixel_px)
@@ -41,7 +41,7 @@ def errors_in_sd(seed: int, errors: CornerErrors) -> Float64:
 
 def main() -> None:
     """Print the rms of the errors in standard deviations, and how many exceed two and three of them."""
-    rigs = int(sys.argv[1]) if len(sys.argv) > 1 else 12
+    rigs = int(sys.argv[1]) if len(sys.argv) > 1 else 8
     print(
         f"{'errors of corners':<32}" + "".join(f"{name:>12}" for name in QUANTITIES) + f"{'all':>7}{'> 2':>7}{'> 3':>7}"
     )

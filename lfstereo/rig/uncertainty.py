@@ -60,7 +60,7 @@ def jackknife_covariance(shots: Sequence[ShotEquations], expected: Float64, expe
     values, vectors = np.linalg.eigh(total / np.outer(scale, scale))
     known = values > len(values) * np.finfo(np.float64).eps * values[-1]
     whitened = (vectors[:, known] / np.sqrt(values[known])).T / scale
-    covariance = whitened.T @ ((whitened * expected_scores) @ whitened.T) @ whitened
+    covariance: Float64 = whitened.T @ ((whitened * expected_scores) @ whitened.T) @ whitened
     share = (len(shots) - 1) / len(shots)
     for shot in shots:
         told, axes = np.linalg.eigh(whitened @ shot.normal @ whitened.T)
