@@ -1,4 +1,4 @@
-"""Draw the figures of the guide from the formulas of ``lfstereo.conventions`` and the shipped rig: three SVG files.
+"""Draw the figures of the guide from the formulas of ``lfstereo.conventions`` and the shipped rig: four SVG files.
 
 python docs/draw_figures.py [-o docs/figures]
 
@@ -37,7 +37,7 @@ def main() -> None:
     if arguments.overview:
         overview = np.asarray(cv2.imread(str(arguments.overview / "result" / "overview.png")))
         cv2.imwrite(str(output.parent / "overview.jpg"), overview, [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY])
-    for name, draw in (("views", views), ("slope", slope), ("disparity_depth", disparity_depth)):
+    for name, draw in _FIGURES.items():
         (output / f"{name}.svg").write_text(draw() + "</svg>\n", "utf-8")
 
 
@@ -105,10 +105,54 @@ def disparity_depth() -> str:
     return "".join(parts)
 
 
+def rig_from_above() -> str:
+    """Draw the two cameras of the shipped rig, their fields of view and the working range, seen from above."""
+    rig = read_rig(RIG)
+    scale, left, foot = 330.0, 180.0, 465.0
+    reach = 1.06 * rig.far_m
+
+    def place(point: np.ndarray) -> str:
+        return f"{left + scale * point[0]:.1f},{foot - scale * point[2]:.1f}"
+
+    parts = [HEAD.format(w=600, h=520), text(20, 22, "the rig from above, to scale")]
+    for z, name in ((rig.near_m, "near"), (rig.far_m, "far")):
+        y = foot - scale * z
+        parts.append(f'<path d="M40 {y:.1f} H560" stroke="#999" stroke-dasharray="3 4"/>')
+        parts.append(text(470, y - 6, f"{name}_m = {z:.2f}"))
+    turns = (np.eye(3), rig.right_from_left)
+    centres = (np.zeros(3), rig.right_centre_m)
+    colours = ("#4878a8", "#c03030")
+    for camera, turn, centre, colour in zip((rig.left, rig.right), turns, centres, colours, strict=True):
+        across = [((x - camera.principal_px[0]) / camera.focal_px[0], 0.0, 1.0) for x in (0, camera.sensor_px[0])]
+        rays = [centre + reach * np.asarray(ray) @ turn for ray in across]
+        ahead = centre + 0.35 * np.array([0.0, 0.0, 1.0]) @ turn
+        parts.append(
+            f'<polygon points="{place(centre)} {place(rays[0])} {place(rays[1])}" fill="{colour}" fill-opacity="0.12" '
+            f'stroke="{colour}"/>'
+        )
+        ends = f"{place(centre)} {place(ahead)}"
+        parts.append(f'<polyline points="{ends}" stroke="{colour}" stroke-width="2.5" fill="none"/>')
+        cx, cy = place(centre).split(",")
+        parts.append(f'<circle cx="{cx}" cy="{cy}" r="4" fill="{colour}"/>')
+    turned = np.degrees(np.linalg.norm(rig.rotation_rad))
+    parts += [
+        text(left - 60, foot + 24, "left", colours[0]),
+        text(left + scale * rig.baseline_m + 14, foot + 24, "right", colours[1]),
+        text(
+            20,
+            508,
+            f"baseline_m = {rig.baseline_m:.3f}; the right camera turned in by {turned:.1f} degrees",
+        ),
+    ]
+    return "".join(parts)
+
+
 def text(x: float, y: float, words: str, colour: str = "#333") -> str:
     """Return a line of text."""
     return f'<text x="{x:.1f}" y="{y:.1f}" fill="{colour}">{words}</text>'
 
+
+_FIGURES = {"views": views, "slope": slope, "disparity_depth": disparity_depth, "rig": rig_from_above}
 
 if __name__ == "__main__":
     main()

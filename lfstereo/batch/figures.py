@@ -56,11 +56,11 @@ def view_difference(result: PairResult) -> float:
 
 
 def write_thumbnail(folder: Path) -> None:
-    """Put the all-in-focus image and the coloured disparity of a result folder side by side, small."""
-    parts = []
-    for name in ("all_in_focus.png", "disparity_colour.png"):
-        picture = np.asarray(cv2.imread(str(folder / name)))
-        width = max(1, round(picture.shape[1] * _THUMBNAIL_HEIGHT_PX / picture.shape[0]))
-        parts.append(cv2.resize(picture, (width, _THUMBNAIL_HEIGHT_PX), interpolation=cv2.INTER_AREA))
+    """Put the all-in-focus image and the coloured disparity of a result folder side by side, small, without a scale."""
+    pictures = [np.asarray(cv2.imread(str(folder / name))) for name in ("all_in_focus.png", "disparity_colour.png")]
+    height, width = pictures[0].shape[:2]
+    small = max(1, round(width * _THUMBNAIL_HEIGHT_PX / height)), _THUMBNAIL_HEIGHT_PX
+    # The scale stands to the right of the coloured map.
+    parts = [cv2.resize(picture[:, :width], small, interpolation=cv2.INTER_AREA) for picture in pictures]
     encoded = cv2.imencode(".jpg", np.hstack(parts), [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY])[1]
     (folder / THUMBNAIL).write_bytes(encoded.tobytes())

@@ -21,19 +21,20 @@ from lfstereo.viewer.template import fill_page
 CSV_NAME, HTML_NAME = "summary.csv", "summary.html"
 _ALWAYS = ("valid_share", "view_difference", "disparity_low_px", "disparity_high_px", "depth_low_m", "depth_high_m")
 _WITH_TRUTH = ("mae_px", "bad_1_percent", "bad_2_percent", "bad_4_percent", "median_depth_error")
-_HEADS = {
-    "valid_share": "valid",
-    "view_difference": "view difference, levels",
-    "disparity_low_px": "disparity from, px",
-    "disparity_high_px": "to, px",
-    "depth_low_m": "depth from, m",
-    "depth_high_m": "to, m",
-    "mae_px": "MAE, px",
-    "bad_1_percent": "off by > 1 px, %",
-    "bad_2_percent": "> 2 px, %",
-    "bad_4_percent": "> 4 px, %",
-    "median_depth_error": "median depth error",
+_SHOWN = {
+    "valid_share": ("seen by both, %", 100.0, 1),
+    "view_difference": ("view difference, levels", 1.0, 2),
+    "disparity_low_px": ("disparity from, px", 1.0, 1),
+    "disparity_high_px": ("disparity to, px", 1.0, 1),
+    "depth_low_m": ("nearest, m", 1.0, 3),
+    "depth_high_m": ("farthest, m", 1.0, 3),
+    "mae_px": ("mean error, px", 1.0, 2),
+    "bad_1_percent": ("off by > 1 px, %", 1.0, 1),
+    "bad_2_percent": ("> 2 px, %", 1.0, 1),
+    "bad_4_percent": ("> 4 px, %", 1.0, 1),
+    "median_depth_error": ("median depth error, %", 100.0, 2),
 }
+"""Figure -> head of its column on the page, factor and digits behind the point."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,10 +55,13 @@ def write_summary(output: Path, rows: Sequence[SummaryRow], leftovers: Sequence[
     OutputError
         If they cannot be written.
     """
-    page = fill_page(page_content(output, rows, leftovers), "batch")
-    for name, text in ((CSV_NAME, _csv(rows)), (HTML_NAME, page)):
-        with atomic_file(output / name, force=True) as scratch:
-            scratch.write_text(text, "utf-8")
+    _write(output / CSV_NAME, _csv(rows))
+    _write(output / HTML_NAME, fill_page(page_content(output, rows, leftovers), "batch"))
+
+
+def _write(path: Path, text: str) -> None:
+    with atomic_file(path, force=True) as scratch:
+        scratch.write_text(text, "utf-8")
 
 
 def _figure_names(rows: Sequence[SummaryRow]) -> tuple[str, ...]:
@@ -93,7 +97,7 @@ def _csv(rows: Sequence[SummaryRow]) -> str:
 
 
 def page_content(output: Path, rows: Sequence[SummaryRow], leftovers: Sequence[Leftover]) -> dict[str, Any]:
-    """Return what the page shows.
+    """Return what the page shows, once the table lies beside it.
 
     Keys
     ----
@@ -102,17 +106,20 @@ def page_content(output: Path, rows: Sequence[SummaryRow], leftovers: Sequence[L
     """
     names = _figure_names(rows)
     counts = {state: sum(row.state == state for row in rows) for state in ("done", "failed", "not done")}
+    size = (output / CSV_NAME).stat().st_size
     return {
         "title": [output.resolve().name],
         "lede": ", ".join(f"{count} {state}" for state, count in counts.items()) + ".",
         "made": f"lfstereo {__version__}",
-        "columns": [[name, _HEADS[name]] for name in names],
+        "columns": [
+            dict(zip(("name", "head", "factor", "digits"), (name, *_SHOWN[name]), strict=True)) for name in names
+        ],
         "pairs": [_page_row(row, names) for row in rows],
         "left_out": [
             [item.kind, ", ".join(capture.place.as_posix() for capture in item.captures), item.reason]
             for item in leftovers
         ],
-        "files": [{"name": CSV_NAME, "href": CSV_NAME, "about": "the same as a table", "bytes": None}],
+        "files": [{"name": CSV_NAME, "href": CSV_NAME, "about": "the same as a table", "bytes": size}],
     }
 
 

@@ -46,18 +46,21 @@ def test_page(tmp_path: Path) -> None:
     assert content["lede"] == "1 done, 1 failed, 1 not done."
     done, failed, waiting = content["pairs"]
     assert (done["name"], done["page"], done["picture"]) == ("a&b", "a%26b/report.html", "a%26b/thumbnail.jpg")
-    shown = dict(zip([name for name, _ in content["columns"]], done["figures"], strict=True))
+    shown = dict(zip([column["name"] for column in content["columns"]], done["figures"], strict=True))
     assert (shown["valid_share"], shown["mae_px"], shown["depth_low_m"]) == (0.91, 2.5, None)
     assert (done["seconds"], done["peak_gib"]) == (3.0, 2.1)
     assert failed == {"name": "c", "state": "failed", "reason": "x.LFR: cut off, <bad>"}
     assert waiting == {"name": "d", "state": "not done"}
     assert content["left_out"] == [["unpaired", "e.LFR", "no other <capture>"]]
+    assert content["files"][0]["bytes"] == (tmp_path / "summary.csv").stat().st_size
     assert "<bad>" not in (tmp_path / "summary.html").read_text()
 
 
 def test_thumbnail_shows_both_pictures(tmp_path: Path) -> None:
-    for name, level in (("all_in_focus.png", 200), ("disparity_colour.png", 50)):
-        cv2.imwrite(str(tmp_path / name), np.full((434, 625, 3), level, np.uint8))
+    map_and_scale = np.full((434, 725, 3), 50, np.uint8)
+    map_and_scale[:, 625:] = 255
+    cv2.imwrite(str(tmp_path / "all_in_focus.png"), np.full((434, 625, 3), 200, np.uint8))
+    cv2.imwrite(str(tmp_path / "disparity_colour.png"), map_and_scale)
     write_thumbnail(tmp_path)
     picture = cv2.imread(str(tmp_path / THUMBNAIL))
     height, width = picture.shape[:2]

@@ -162,9 +162,9 @@ def press(page: Page, words: str) -> None:
 
 def test_batch_is_sorted_sieved_and_searched(batch: Page) -> None:
     assert names(batch) == ["scene & 0", "scene & 1", "scene & 2", "broken"]
-    press(batch, "MAE")
+    press(batch, "MEAN ERROR")
     assert names(batch) == ["scene & 1", "scene & 0", "scene & 2", "broken"]
-    press(batch, "MAE")
+    press(batch, "MEAN ERROR")
     assert names(batch) == ["scene & 2", "scene & 0", "scene & 1", "broken"]
     press(batch, "Failed")
     assert names(batch) == ["broken"]

@@ -6,15 +6,14 @@ const STATES = [["", "All"], ["done", "Done"], ["failed", "Failed"], ["not done"
   .filter(({ state, count }) => !state || count);
 const shown = { state: "", words: "", by: null, falling: false };
 
-// Four digits that count, as in the table beside the page.
-const amountText = (value) => (value === null || value === undefined ? "" : String(Number(value.toPrecision(4))));
-
 const COLUMNS = [
-  { head: "Pair", of: (pair) => pair.name, text: true },
-  { head: "All in focus, disparity" },
+  { head: "pair", of: (pair) => pair.name, text: true },
+  { head: "all in focus, disparity" },
   { head: "seconds", of: (pair) => pair.seconds, show: (value) => value.toFixed(1) },
   { head: "peak GiB", of: (pair) => pair.peak_gib, show: (value) => value.toFixed(2) },
-  ...CONTENT.columns.map(([, head], k) => ({ head, of: (pair) => pair.figures && pair.figures[k], show: amountText })),
+  ...CONTENT.columns.map(({ head, factor, digits }, k) => ({
+    head, of: (pair) => pair.figures && pair.figures[k], show: (value) => (factor * value).toFixed(digits),
+  })),
 ];
 
 function middle(values) {
@@ -24,7 +23,7 @@ function middle(values) {
 
 function showNumbers() {
   const done = PAIRS.filter((pair) => pair.state === "done");
-  const of = (name) => middle(done.map((pair) => pair.figures[CONTENT.columns.findIndex(([column]) => column === name)]));
+  const of = (name) => middle(done.map((pair) => pair.figures[CONTENT.columns.findIndex((column) => column.name === name)]));
   const medians = [["valid_share", "Seen by both, median", (v) => [(100 * v).toFixed(1), "%"]], ["mae_px", "Mean error, median", (v) => [v.toFixed(2), "px"]],
     ["depth_low_m", "Nearest, median", (v) => [v.toFixed(2), "m"]], ["depth_high_m", "Farthest, median", (v) => [v.toFixed(2), "m"]]];
   byId("numbers").append(
