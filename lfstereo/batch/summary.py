@@ -22,7 +22,7 @@ CSV_NAME, HTML_NAME = "summary.csv", "summary.html"
 _ALWAYS = ("valid_share", "view_difference", "disparity_low_px", "disparity_high_px", "depth_low_m", "depth_high_m")
 _WITH_TRUTH = ("mae_px", "bad_1_percent", "bad_2_percent", "bad_4_percent", "median_depth_error")
 _SHOWN = {
-    "valid_share": ("seen by both, %", 100.0, 1),
+    "valid_share": ("valid, %", 100.0, 1),
     "view_difference": ("view difference, levels", 1.0, 2),
     "disparity_low_px": ("disparity from, px", 1.0, 1),
     "disparity_high_px": ("disparity to, px", 1.0, 1),

@@ -47,7 +47,7 @@ KNOWN_FILES = {
     "disparity.png": "disparity, 16 bit, 256 per px, 0 = unknown",
     "disparity_colour.png": "disparity as colours, scale in px and metres",
     "depth.tiff": "depth z in metres, float32",
-    "valid.png": "where both cameras see",
+    "valid.png": "where depth is known",
     "all_in_focus.png": "left view, everything sharp, sRGB",
     "centre_left.png": "left centre view, rectified, sRGB",
     "centre_right.png": "right centre view, rectified, sRGB",
@@ -133,7 +133,7 @@ def result_content(encoded: EncodedResult, run_toml: str, folder: Path) -> dict[
     near, far = summary["depth_m"]
     lede = (
         f"{summary['width']} × {summary['height']} px, {near:.2f} to {far:.2f} m from the camera, "
-        f"{100 * summary['valid_share']:.0f} % of the picture seen by both cameras."
+        f"{100 * summary['valid_share']:.0f} % of the picture valid."
     )
     return encoded.parts | {
         "title": [record["inputs"]["left"], record["inputs"]["right"]],

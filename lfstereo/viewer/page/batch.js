@@ -24,7 +24,7 @@ function middle(values) {
 function showNumbers() {
   const done = PAIRS.filter((pair) => pair.state === "done");
   const of = (name) => middle(done.map((pair) => pair.figures[CONTENT.columns.findIndex((column) => column.name === name)]));
-  const medians = [["valid_share", "Seen by both, median", (v) => [(100 * v).toFixed(1), "%"]], ["mae_px", "Mean error, median", (v) => [v.toFixed(2), "px"]],
+  const medians = [["valid_share", "Valid, median", (v) => [(100 * v).toFixed(1), "%"]], ["mae_px", "Mean error, median", (v) => [v.toFixed(2), "px"]],
     ["depth_low_m", "Nearest, median", (v) => [v.toFixed(2), "m"]], ["depth_high_m", "Farthest, median", (v) => [v.toFixed(2), "m"]]];
   byId("numbers").append(
     figure("Done", `${done.length} of ${PAIRS.length}`),

@@ -44,7 +44,7 @@ const depthMode = {
     const ofMap = element("div", {},
       rangeControl("Disparity over image", { min: 0, max: 1, step: 0.01, value: this.opacity },
         (value) => `${Math.round(100 * value)} %`, (value) => { this.opacity = value; redraw(); }),
-      switchControl("Hide what one camera alone sees", this.hide, (on) => { this.hide = on; redraw(); }));
+      switchControl("Hide what is not valid", this.hide, (on) => { this.hide = on; redraw(); }));
     const ofOverlay = element("div", { id: "overlay" });
     const show = (id) => {
       this.overlay = OVERLAYS.find((overlay) => overlay.id === id) || null;

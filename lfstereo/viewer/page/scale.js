@@ -71,7 +71,7 @@ const READINGS = [
   ...OVERLAYS.map((overlay) => ({
     name: overlay.name, of: (at) => overlayAt(overlay, at.x, at.y)?.toFixed(2) ?? "—", unit: "px", id: overlay.id, optional: true,
   })),
-  { name: "Seen by", of: (at) => (isValid(at.x, at.y) ? "both" : "one"), unit: "", shown: Boolean(DISPARITY), id: "seen", optional: true },
+  { name: "Valid", of: (at) => (isValid(at.x, at.y) ? "yes" : "no"), unit: "", shown: Boolean(DISPARITY), id: "valid", optional: true },
 ].filter((reading) => reading.shown !== false);
 
 function buildReadout() {

@@ -10,13 +10,13 @@ function figuresSheet() {
   const numbers = element("dl", { className: "numbers" },
     figure("Depth", shortSpan(summary.depth_m, 2), "m"),
     figure("Disparity", shortSpan(summary.disparity_px, 1), "px"),
-    figure("Seen by both cameras", (100 * summary.valid_share).toFixed(1), "%"),
+    figure("Valid", (100 * summary.valid_share).toFixed(1), "%"),
     figure("Points", grouped(summary.points)),
     figure(`1 px of disparity at ${middle.toFixed(2)} m`, perPixel.toFixed(1), "mm"),
     figure("Baseline", (1000 * geometry.baseline_m).toFixed(1), "mm"),
     figure("Time", total(seconds).toFixed(1), "s"),
     figure("Peak memory", Math.max(...Object.values(peak)).toFixed(2), "GiB"));
-  return sheet("Figures", "Depth and disparity from the 1st to the 99th percentile of what both cameras see.", numbers, histogram());
+  return sheet("Figures", "Depth and disparity from the 1st to the 99th percentile of what is valid: seen by both cameras, and sure where the network tells.", numbers, histogram());
 }
 
 // How much of the picture lies at which disparity, in the colours of the map.
@@ -43,12 +43,12 @@ function histogram() {
 }
 
 function errorsSheet() {
-  const head = ["", "Mean error", "off > 1 px", "> 2 px", "> 4 px", "Median of depth"].map((name, k) => ({ name, amount: k > 0 }));
-  const rows = Object.entries(RECORD.error).map(([name, e], k) => ({
-    own: k === 0,
-    cells: [name, `${e.mae_px.toFixed(2)} px`, ...[1, 2, 4].map((n) => `${e[`bad_${n}_percent`].toFixed(1)} %`), `${(100 * e.median_depth_error).toFixed(2)} %`],
+  const head = ["", "Pixels", "Mean error", "off > 1 px", "> 2 px", "> 4 px", "Median of depth"].map((name, k) => ({ name, amount: k > 0 }));
+  const rows = Object.entries(RECORD.error).map(([name, e]) => ({
+    own: name.startsWith("lfstereo"),
+    cells: [name, `${(e.judged_percent ?? 100).toFixed(0)} %`, `${e.mae_px.toFixed(2)} px`, ...[1, 2, 4].map((n) => `${e[`bad_${n}_percent`].toFixed(1)} %`), `${(100 * e.median_depth_error).toFixed(2)} %`],
   }));
-  return sheet("Against the truth", "Every pixel seen by both cameras whose true disparity is known. Other methods ran on the rectified centre views, holes filled.", table(head, rows));
+  return sheet("Against the truth", "Every pixel that both cameras can see and whose true disparity is known, or the share of them that a line tells. Other methods ran on the rectified centre views, holes filled.", table(head, rows));
 }
 
 function timesSheet() {
