@@ -69,6 +69,8 @@ class PairResult:
     right: SideResult
     geometry: RectifiedGeometry
     weights_sha256: str
+    common: Bool
+    """``(V, U)``: where the left view shows what the right one holds too; the map's valid pixels are among these."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,19 +156,20 @@ def focus_pair(
 
 
 def match_pair(focused: FocusedPair, network: Network, clock: StageClock) -> PairResult:
-    """Let the network find the disparity of a pair of focal stacks; valid is what both cameras see."""
+    """Let the network find the disparity of a pair of focal stacks; valid where both see and the network is sure."""
     from lfstereo.network.estimate import estimate_disparity
 
     left, right = focused.left, focused.right
     with clock.stage("disparity") as progress:
         found = estimate_disparity(left.stack, right.stack, network, progress)
-    valid = found.valid & common_field(found.disparity, left.seen, right.seen)
+    common = common_field(found.disparity, left.seen, right.seen)
     return PairResult(
-        map=replace(found, valid=valid),
+        map=replace(found, valid=found.valid & common),
         left=left,
         right=right,
         geometry=focused.geometry,
         weights_sha256=network.card.sha256,
+        common=common,
     )
 
 

@@ -73,7 +73,7 @@ class Report:
     seconds: dict[str, float]
     peak_gib: dict[str, float]
     errors: dict[str, dict[str, float]]
-    """Per method: mae_px, bad_1/2/4_percent and median_depth_error (relative); empty without truth."""
+    """Per method: judged_percent, mae_px, bad_1/2/4_percent, median_depth_error (relative); empty without truth."""
 
     @property
     def peak_memory_gib(self) -> float:
@@ -164,21 +164,26 @@ def read_truth(folder: Path, size: tuple[int, int]) -> DisparityTruth:
 def truth_errors(result: PairResult, truth: DisparityTruth) -> dict[str, dict[str, float]]:
     """Compare with a true disparity map, beside SGBM and SGBM + WLS (holes filled) on the rectified centre views.
 
-    All are judged at every pixel whose truth is known inside the common field of view.
+    All are judged at every pixel whose truth is known inside the common field of view, our own once more where it is
+    valid: a network that knows its errors answers less than that.
     """
-    judged = truth.known & result.map.valid
+    everywhere = truth.known & result.common
     centres = result.left.centre_view, result.right.centre_view
-    candidates = {"lfstereo": result.map}
+    candidates = {"lfstereo": result.map, "lfstereo, where valid": result.map}
     for name, match in (("SGBM", sgbm), ("SGBM + WLS", sgbm_wls)):
         candidates[name] = fill_from_background(match(*centres, result.geometry.disparity_max_px))
-    depth_true = _depth(result, truth.disparity, judged)
+    depth_true = _depth(result, truth.disparity, everywhere)
     errors = {}
     for name, found in candidates.items():
+        judged = everywhere & found.valid if name.endswith("valid") else everywhere
+        if not judged.any():
+            continue
         scores = score_disparity(found.disparity, truth.disparity, judged)
         depth = _depth(result, found.disparity, judged)
         both = depth.valid & depth_true.valid
         relative = np.abs(depth.depth_m - depth_true.depth_m)[both] / depth_true.depth_m[both]
         errors[name] = {
+            "judged_percent": 100 * float(judged.sum() / everywhere.sum()),
             "mae_px": scores.mae_px,
             "bad_1_percent": scores.bad_1,
             "bad_2_percent": scores.bad_2,

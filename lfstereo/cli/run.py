@@ -57,9 +57,13 @@ def _text(report: Report, output: Path) -> str:
     ]
     lines += [f"  {name:<22}{s:>9.1f}{report.peak_gib[name]:>10.2f}" for name, s in report.seconds.items()]
     if report.errors:
-        lines.append(f"{'error against truth':<24}{'MAE px':>9}{'bad 1':>9}{'bad 2':>9}{'bad 4':>9}{'median z':>10}")
+        lines.append(
+            f"{'error against truth':<24}{'MAE px':>9}{'bad 1':>9}{'bad 2':>9}{'bad 4':>9}{'median z':>10}{'judged':>8}"
+        )
         for name, e in report.errors.items():
             share = "".join(f"{e[f'bad_{n}_percent']:>8.1f}%" for n in (1, 2, 4))
-            lines.append(f"  {name:<22}{e['mae_px']:>9.3f}{share}{e['median_depth_error']:>10.2%}")
+            lines.append(
+                f"  {name:<22}{e['mae_px']:>9.3f}{share}{e['median_depth_error']:>10.2%}{e['judged_percent']:>7.1f}%"
+            )
     lines.append(f"pictures and data: {output}/ (look first at {output / PAGE_NAME})")
     return "\n".join(lines)

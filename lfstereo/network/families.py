@@ -12,7 +12,7 @@ AnyArchitecture = Architecture | BinocularArchitecture
 AnyNetwork = BdffNet | BinocularNet
 
 
-def read_architecture(table: dict[str, Any], where: str) -> AnyArchitecture:
+def read_architecture(table: Any, where: str) -> AnyArchitecture:
     """Read an ``[architecture]`` table; one that names no family describes the published networks.
 
     Raises
@@ -20,7 +20,7 @@ def read_architecture(table: dict[str, Any], where: str) -> AnyArchitecture:
     ConfigError
         If an entry is unknown or a value does not fit.
     """
-    if table.get("family") == "binocular":
+    if isinstance(table, dict) and table.get("family") == "binocular":
         return from_mapping(BinocularArchitecture, table, where)
     return from_mapping(Architecture, table, where)
 

@@ -15,6 +15,7 @@ from pathlib import Path
 
 from lfstereo.errors import ConfigError
 from lfstereo.network.bdff_net import Architecture, paper_architecture
+from lfstereo.network.binocular_net import BinocularArchitecture
 from lfstereo.network.card import LICENCE, Metric, ModelCard, Training
 from lfstereo.network.families import AnyArchitecture, build
 from lfstereo.network.weights import load_model, save_model
@@ -43,6 +44,12 @@ LIMITS = (
     "trained on a processor for under two hours, on rendered scenes only: expect errors of several px on thin objects, "
     "plain surfaces, reflections, and where the left view sees what the right one does not",
 )
+BINOCULAR_DATA = "rendered rooms and layers (lfstereo.training.rooms, lfstereo.training.scenes); no evaluation set"
+BINOCULAR_LIMITS = (
+    "5 to 64 slices in any spacing, disparities from 0 to 256 px; training saw 8 to 31 slices and 0 to 100 px",
+    "aperture ratio D/B of 0.05 to 0.4 in training, mostly 0.08 to 0.2",
+    "trained on rendered scenes only: expect errors on reflections, glass and large plain surfaces",
+)
 
 
 def publish(
@@ -52,6 +59,7 @@ def publish(
     device: str,
     architecture: AnyArchitecture = Architecture(),
     force: bool = False,
+    data: str = "",
 ) -> ModelCard:
     """Assemble and write a model.
 
@@ -69,13 +77,15 @@ def publish(
         Widths and variants that the runs were made with.
     force
         Replace an existing folder.
+    data
+        What it was trained on, in words; unset: the scenes of the shipped recipes.
 
     Raises
     ------
     ConfigError
         If a part has no source, or the folder's name has no version.
     """
-    network = build(architecture)
+    network, binocular = build(architecture), isinstance(architecture, BinocularArchitecture)
     parts = [part for part, _ in network.named_children()]
     if missing := [part for part in parts if part not in sources]:
         raise ConfigError(f"publish: no run is given for {missing[0]}, expected {', '.join(parts)}")
@@ -88,14 +98,15 @@ def publish(
     network.load_state_dict(state, strict=True)
     counters = [Counters(**json.loads((run / FOLDER / "counters.json").read_text())) for run in stages]
     story = Training(
-        data=DATA,
+        data=data or (BINOCULAR_DATA if binocular else DATA),
         device=device,
         minutes=round(sum(c.elapsed_s for c in counters) / 60, 1),
         date=datetime.now(UTC).date().isoformat(),
         stages=tuple(f"{c.stage}: {c.step} steps, {c.elapsed_s / 60:.1f} min" for c in counters),
     )
-    deviations = () if architecture == paper_architecture() else DEVIATIONS
-    card = ModelCard(name, int(version), LICENCE, "", deviations, LIMITS, network.architecture, story)
+    deviations = () if binocular or architecture == paper_architecture() else DEVIATIONS
+    limits = BINOCULAR_LIMITS if binocular else LIMITS
+    card = ModelCard(name, int(version), LICENCE, "", deviations, limits, architecture, story)
     return save_model(folder, network, card, force)
 
 
@@ -138,12 +149,15 @@ def main(words: Sequence[str] | None = None) -> int:
     parser.add_argument("--stages", nargs="*", type=Path, default=[], help="run folders, for the training story")
     parser.add_argument("--device", default="processor")
     parser.add_argument("--recipe", type=Path, help="recipe with the runs' [architecture]; default: the shipped one")
+    parser.add_argument("--data", default="", help="what the model was trained on, in words")
     parser.add_argument("--measure", type=int, default=0, metavar="N", help="measure on N held-out scenes for the card")
     parser.add_argument("--force", action="store_true")
     arguments = parser.parse_args(words)
     sources = {part: Path(run) for part, _, run in (text.partition("=") for text in arguments.parts)}
     architecture = read_recipe(arguments.recipe)[1] if arguments.recipe else Architecture()
-    publish(sources, arguments.output, arguments.stages, arguments.device, architecture, arguments.force)
+    publish(
+        sources, arguments.output, arguments.stages, arguments.device, architecture, arguments.force, arguments.data
+    )
     if arguments.measure:
         measure(arguments.output, arguments.measure)
     return 0

@@ -78,7 +78,7 @@ def pair_result() -> PairResult:
     cameras = [RectifiedCamera(np.eye(3), (cx, (ROWS - 1) / 2)) for cx in (70.0, 70.0 + DOFFS_PX)]
     geometry = RectifiedGeometry(*cameras, FOCAL_PX, BASELINE_M, (ROWS, COLUMNS), 0.3, 0.3, 90.0)
     unsure = np.where(map_px == NEAR_PX, *UNCERTAINTY_PX).astype(np.float32)
-    return PairResult(DisparityMap(map_px, seen, sharp, unsure), *sides, geometry, "0" * 64)
+    return PairResult(DisparityMap(map_px, seen, sharp, unsure), *sides, geometry, "0" * 64, seen)
 
 
 @pytest.fixture(scope="session")
