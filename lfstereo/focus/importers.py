@@ -11,6 +11,8 @@ from typing import Any
 
 import cv2
 import numpy as np
+import numpy.typing as npt
+import tifffile
 
 from lfstereo.arrays import Float32, Float64, Rgb
 from lfstereo.errors import ConfigError, ContainerError, ShapeError
@@ -22,6 +24,9 @@ from lfstereo.progress import Progress, silent
 
 PICTURE_SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".ppm", ".webp")
 RAW_SUFFIXES = (".dng", ".nef", ".nrw", ".cr2", ".cr3", ".arw", ".raf", ".orf", ".rw2", ".pef", ".srw", ".3fr", ".iiq")
+_ORIENTATION_TAG = 274
+_BACKWARDS = {2: (1, -1), 3: (-1, -1), 4: (-1, 1), 6: (1, -1), 7: (-1, -1), 8: (-1, 1)}
+"""Step along rows and columns, after they were exchanged, by orientation."""
 _PNG_DEPTH_BYTE, _PNG_DEEP = 24, 16
 
 
@@ -33,7 +38,9 @@ class ImportOptions:
     width_px: int = option(2000, "reduce pictures that are wider; 0: keep their size", "px")
 
 
-def read_sweep(folder: Path, options: ImportOptions = ImportOptions(), progress: Progress = silent) -> FocusSweep:
+def read_sweep(
+    folder: Path, options: ImportOptions = ImportOptions(), progress: Progress = silent, fewest: int = 2
+) -> FocusSweep:
     """Read a folder of pictures of one scene at several focus distances.
 
     RAW files are developed with the first one's white balance and without automatic brightness, so that all slices
@@ -47,6 +54,8 @@ def read_sweep(folder: Path, options: ImportOptions = ImportOptions(), progress:
         Where the distances come from, and how large the slices become.
     progress
         Told the pictures read.
+    fewest
+        Pictures that there must be.
 
     Returns
     -------
@@ -56,7 +65,7 @@ def read_sweep(folder: Path, options: ImportOptions = ImportOptions(), progress:
     Raises
     ------
     ContainerError
-        If the folder cannot be read, holds fewer than two pictures, RAW beside others, or one that cannot be read.
+        If the folder cannot be read, holds too few pictures, RAW beside others, or one that cannot be read.
     ShapeError
         If the pictures differ in size.
     ConfigError
@@ -64,7 +73,7 @@ def read_sweep(folder: Path, options: ImportOptions = ImportOptions(), progress:
     """
     if options.width_px < 0:
         raise ConfigError(f"width_px = {options.width_px}: expected 0 px or more")
-    paths = find_pictures(folder)
+    paths = find_pictures(folder, fewest)
     tags = [read_focus_tags(path) for path in paths]
     distances = _distances(paths, tags, options.distances)
     if distances is not None:
@@ -80,13 +89,13 @@ def is_raw(path: Path) -> bool:
     return path.suffix.lower() in RAW_SUFFIXES
 
 
-def find_pictures(folder: Path) -> list[Path]:
+def find_pictures(folder: Path, fewest: int = 2) -> list[Path]:
     """Return the pictures of a folder in the natural order of their names: 2 before 10.
 
     Raises
     ------
     ContainerError
-        If it cannot be read, holds fewer than two pictures, or RAW files beside others.
+        If it cannot be read, holds fewer than ``fewest`` pictures, or RAW files beside others.
     """
     try:
         found = sorted((p for p in folder.iterdir() if not p.name.startswith(".")), key=_natural)
@@ -99,7 +108,7 @@ def find_pictures(folder: Path) -> list[Path]:
             f"{folder}: found {len(raw)} RAW files beside {len(pictures)} other pictures, expected one kind; "
             "move the others elsewhere"
         )
-    if len(raw) + len(pictures) < 2:
+    if len(raw) + len(pictures) < fewest:
         raise ContainerError(
             f"{folder}: found {len(raw) + len(pictures)} pictures, expected two or more of one scene at different "
             "focus; give the folder of a focus sweep"
@@ -225,6 +234,8 @@ def _read_picture(path: Path) -> Rgb:
         elif path.suffix.lower() in (".tif", ".tiff"):
             plugin = {"plugin": "tifffile"}
         pixels = np.asarray(iio.imread(path, **plugin))
+        if plugin == {"plugin": "tifffile"}:
+            pixels = _turned(pixels, _tiff_orientation(path))
     except Exception as error:  # every decoder has its own kinds
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise ContainerError(f"{path}: cannot be read as a picture ({reason}); export it again") from error
@@ -237,6 +248,24 @@ def _read_picture(path: Path) -> Rgb:
         )
     pixels = pixels[..., :3]
     return pixels if pixels.dtype == np.float32 else srgb_to_linear(pixels)
+
+
+def _tiff_orientation(path: Path) -> int:
+    with tifffile.TiffFile(path) as file:
+        return int(file.pages.first.tags.valueof(_ORIENTATION_TAG, default=1))
+
+
+def _turned(pixels: npt.NDArray[Any], orientation: int) -> npt.NDArray[Any]:
+    """Return a picture upright that lies as the tag says: 5 to 8 have rows and columns exchanged.
+
+    References
+    ----------
+    CIPA DC-008 (Exif 2.32), Orientation.
+    """
+    if orientation in (5, 6, 7, 8):
+        pixels = pixels.swapaxes(0, 1)
+    rows, columns = _BACKWARDS.get(orientation, (1, 1))
+    return pixels[::rows, ::columns]
 
 
 def _lens(tags: FocusTags, size: tuple[int, int]) -> LensData:
