@@ -17,7 +17,7 @@ from lfstereo.errors import ContainerError, InputError
 from lfstereo.lightfield.field import LightField
 from lfstereo.lightfield.interchange.description import from_text, to_text
 from lfstereo.lightfield.interchange.hdf5_guard import stored_dataset
-from lfstereo.lightfield.interchange.mat5_guard import check_mat5
+from lfstereo.lightfield.interchange.mat5 import read_array
 from lfstereo.lightfield.options import PictureOptions
 from lfstereo.outputs import atomic_file, check_absent, check_space
 from lfstereo.progress import Progress, silent
@@ -141,13 +141,10 @@ def _read_hdf5(file: Any, path: Path) -> LightField:
 
 
 def _read_older(path: Path) -> LightField:
-    from scipy.io import loadmat
-
-    check_mat5(path)
-    found = loadmat(path, variable_names=["LF"]).get("LF")
+    found = read_array(path, "LF")
     if found is None:
         raise ContainerError(f"{path}: found no variable 'LF', expected one; give a file named NAME__Decoded.mat")
-    stored = np.asarray(found)
+    stored = found
     _check_kind(stored.shape, stored.dtype, path)
     weight = _weight(stored[..., 3]) if stored.shape[4] == 4 else None
     views = np.ascontiguousarray(_share(stored[..., :3]))
