@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -10,9 +11,40 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import HealthCheck, settings
 
 from lfstereo.container import Capture, FrameMetadata
 from lfstereo.container.mosaic_image import read_camera_profile
+
+# The same examples every time, however slow the machine.
+settings.register_profile(
+    "suite",
+    max_examples=40,
+    derandomize=True,
+    database=None,
+    deadline=None,
+    suppress_health_check=[HealthCheck.too_slow],
+)
+settings.load_profile("suite")
+_NETWORK_EVENTS = {"socket.connect", "socket.getaddrinfo", "socket.gethostbyname", "socket.sendto", "urllib.Request"}
+_offline = False
+
+
+def _refuse_network(event: str, arguments: tuple[object, ...]) -> None:
+    if _offline and event in _NETWORK_EVENTS:
+        raise AssertionError(f"{event} {arguments[1:]}: lfstereo must not use the network")
+
+
+sys.addaudithook(_refuse_network)
+
+
+@pytest.fixture
+def offline() -> Iterator[None]:
+    """A test in which no connection may be opened and no name looked up, however deep inside a library."""
+    global _offline
+    _offline = True
+    yield
+    _offline = False
 
 
 @pytest.fixture(scope="session")

@@ -11,11 +11,13 @@ from hypothesis import strategies as st
 
 from lfstereo.lenslet.fit import fit_grid
 
-RMS_PX = 0.02
-"""Known lattice, 1 DN noise, about 200 lenslets."""
+RMS_PX = 0.05
+"""Known lattice, 1 DN noise, some 400 lenslets. Where rows lie along the pixels and the pitch is nearly an even number of
+px, centres follow the Bayer pattern by up to 0.06 px, and 22 lenslets in a row are too few to even that out; elsewhere
+0.01 px are left, on a whole sensor 0.0014 px (`benchmarks/bench_grid.py`)."""
 
 
-@settings(max_examples=6, deadline=None)
+@settings(max_examples=6)
 @given(
     rotation=st.floats(-0.5, 0.5),
     pitch=st.floats(9.9, 15.0),
