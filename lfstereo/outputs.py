@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import re
 import secrets
 import shutil
 from collections.abc import Iterator
@@ -11,6 +12,11 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from lfstereo.errors import OutputError
+
+_RESERVED_ON_WINDOWS = frozenset(
+    ("con", "prn", "aux", "nul", *(f"{port}{number}" for port in ("com", "lpt") for number in range(10)))
+)
+"""Microsoft, "Naming Files, Paths, and Namespaces": devices, with any suffix."""
 
 
 def check_absent(target: Path, force: bool) -> None:
@@ -39,6 +45,20 @@ def check_space(target: Path, size_bytes: int) -> None:
         raise OutputError(
             f"{target}: the disk is full; needs {size_bytes / 2**20:.0f} MiB, {free / 2**20:.0f} MiB are free"
         )
+
+
+def portable_name(text: str) -> str:
+    """Return a file name that every system allows: letters, digits, ``-``, ``_`` and single dots inside.
+
+    Examples
+    --------
+    >>> portable_name("B51:43/..9"), portable_name("con.txt"), portable_name("MOD_0001.RAW"), portable_name("")
+    ('B51_43_.9', '_con.txt', 'MOD_0001.RAW', '_')
+    """
+    kept = "".join(c if c.isascii() and (c.isalnum() or c in "-_.") else "_" for c in text)
+    name = re.sub(r"\.+", ".", kept).strip(".")
+    reserved = name.partition(".")[0].lower() in _RESERVED_ON_WINDOWS
+    return f"_{name}" if reserved or not name else name
 
 
 @contextmanager

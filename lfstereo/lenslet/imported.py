@@ -9,7 +9,7 @@ from pathlib import Path, PurePosixPath
 from lfstereo.container.members import Member
 from lfstereo.errors import AssetError
 from lfstereo.lenslet.library import WhiteImage, open_library
-from lfstereo.outputs import atomic_file
+from lfstereo.outputs import atomic_file, portable_name
 from lfstereo.progress import Progress, silent
 
 
@@ -67,10 +67,10 @@ def import_whites(source: Path, library: Path, progress: Progress = silent) -> I
 
 
 def _targets(white: WhiteImage, library: Path) -> Iterator[tuple[Path, Member]]:
-    folder = library / "".join(c if c.isalnum() or c in "-_" else "_" for c in white.serial)
+    folder = library / portable_name(white.serial)
     for member in (white.raw, white.text, white.hot_pixels, white.factory, white.unit_info, white.manifest):
         if member is not None:
-            yield folder / PurePosixPath(member.name).name, member
+            yield folder / portable_name(PurePosixPath(member.name).name), member
 
 
 def _copy(member: Member, target: Path) -> bool:

@@ -64,7 +64,8 @@ def whites_of_camera(library: WhiteLibrary, metadata: FrameMetadata) -> tuple[Wh
         found = sorted({camera_mark(white.serial) or "unknown" for white in library.whites})
         raise AssetError(
             f"{place}: found white images of camera {', '.join(found)}, expected "
-            f"{camera_mark(metadata.serial) or 'one'} ({metadata.width} x {metadata.height} px) as the capture; give the white images of that camera"
+            f"{camera_mark(metadata.serial) or 'one'} ({metadata.width} x {metadata.height} px) as the capture; give "
+            "the white images of that camera"
         )
     return fitting
 

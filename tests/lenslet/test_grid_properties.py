@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from lfstereo.lenslet.fit import fit_grid
 
 RMS_PX = 0.05
-"""Known lattice, 1 DN noise, some 400 lenslets. Where rows lie along the pixels and the pitch is nearly an even number of
-px, centres follow the Bayer pattern by up to 0.06 px, and 22 lenslets in a row are too few to even that out; elsewhere
+"""Known lattice, 1 DN noise, some 400 lenslets. Where rows lie along the pixels and the pitch is nearly an even number,
+centres follow the Bayer pattern by up to 0.06 px, and 22 lenslets in a row are too few to even that out; elsewhere
 0.01 px are left, on a whole sensor 0.0014 px (`benchmarks/bench_grid.py`)."""
 
 
