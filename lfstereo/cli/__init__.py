@@ -1,1 +1,1 @@
-
+"""The program ``lfstereo``: one module per command."""

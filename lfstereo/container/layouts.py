@@ -86,6 +86,7 @@ def illum_toc(metadata: FrameMetadata, references: dict[str, str], thumbnail: Js
 
 
 def frame_parameters(metadata: FrameMetadata) -> Json:
+    """Return what a table of contents says of a frame: whether it is dark or of a white target."""
     tags = {"darkFrame": metadata.is_dark_frame, "modulationFrame": metadata.is_white_image}
     return {"vendorContent": {"com.lytro.tags": tags}}
 

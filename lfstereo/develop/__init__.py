@@ -1,1 +1,1 @@
-
+"""Stage 3: a raw mosaic to linear RGB."""

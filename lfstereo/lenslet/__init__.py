@@ -1,1 +1,1 @@
-
+"""Stage 2: white images to the lattice of micro-images."""

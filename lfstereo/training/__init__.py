@@ -1,1 +1,1 @@
-
+"""Stage 10: train and evaluate the networks."""
