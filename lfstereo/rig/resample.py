@@ -8,7 +8,7 @@ import numpy as np
 from lfstereo.arrays import Float32, Float64, UInt8
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@numba.njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[untyped-decorator]
 def resample_view(
     view: Float32,
     weight: UInt8,
@@ -40,7 +40,7 @@ def resample_view(
     m, n = picture_from_rectified, view_from_picture
     k1, k2, k3, b1, b2 = bend
     across, down = np.empty(4, np.float32), np.empty(4, np.float32)
-    at_x, at_y = np.empty(4, np.int64), np.empty(4, np.int64)
+    at_x, at_y = np.empty(4, np.uintp), np.empty(4, np.uintp)
     for row in range(out.shape[0]):
         for column in range(out.shape[1]):
             depth = m[2, 0] * column + m[2, 1] * row + m[2, 2]
@@ -57,8 +57,8 @@ def resample_view(
             _cubic(np.float32(x - left), across)
             _cubic(np.float32(y - top), down)
             for k in range(4):
-                at_x[k] = min(max(left - 1 + k, 0), columns - 1)
-                at_y[k] = min(max(top - 1 + k, 0), rows - 1)
+                at_x[k] = np.uintp(min(max(left - 1 + k, 0), columns - 1))
+                at_y[k] = np.uintp(min(max(top - 1 + k, 0), rows - 1))
             red, green, blue = np.float32(0), np.float32(0), np.float32(0)
             for j in range(4):
                 for i in range(4):

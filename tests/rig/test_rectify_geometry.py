@@ -147,7 +147,7 @@ def test_rectifying_an_already_parallel_camera_changes_nothing() -> None:
 
 def test_refuses_a_rig_for_another_camera() -> None:
     rig = toed_in_rig()
-    with pytest.raises(AssetError, match=r"B5152102610.*B5143909630"):
+    with pytest.raises(AssetError, match=r"camera #9d9e, but the rig's left camera is #1887"):
         rectify(decoded(rig.right), rig, rectified_geometry(rig), "left")
 
 
