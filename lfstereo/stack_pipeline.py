@@ -18,6 +18,7 @@ from lfstereo.focus.alignment import AlignedSweep, AlignOptions, align_sweep
 from lfstereo.focus.even_slices import even_stack
 from lfstereo.focus.importers import ImportOptions, read_sweep
 from lfstereo.focus.measures import FocusIndex, FocusOptions, find_focus
+from lfstereo.focus.stack import FocalStack
 from lfstereo.focus.sweep import depth_at, vergence
 from lfstereo.lightfield.field import LightField, ViewSampling
 from lfstereo.options import option
@@ -40,8 +41,13 @@ class SweepOptions:
 
     metric: bool = option(False, "refuse sweeps that do not tell their distances, instead of giving slices alone")
     focal_px: float | None = option(None, "focal length in px of the pictures as they are; unset: from EXIF", "px")
-    match: Literal["stereo", "network"] = option(
-        "stereo", "two sweeps: SGBM + WLS on the all-in-focus pictures, or the BDfF network on the slices"
+    match: Literal["stereo", "network", "pictures"] = option(
+        "stereo",
+        "two sweeps: SGBM + WLS on the all-in-focus pictures, a network on the slices, or the network on the "
+        "all-in-focus pictures, which may also be one ordinary picture each",
+    )
+    judge: Literal["method", "network"] = option(
+        "method", "one sweep: the published --method, or a network of the binocular family"
     )
     baseline_m: float | None = option(None, "distance of the two cameras, where no rig tells", "m")
     doffs_px: float = option(0.0, "difference of their principal points, right minus left, where no rig tells", "px")
@@ -119,7 +125,10 @@ def run_sweep(folder: Path, options: StackOptions, clock: StageClock) -> SweepRe
     if options.sweep.metric:
         vergence(sweep)
     with clock.stage("depth from focus"):
-        found = find_focus(sweep.slices, options.focus)
+        if options.sweep.judge == "network":
+            found = _focus_by_network(sweep.slices, options.sweep, str(folder))
+        else:
+            found = find_focus(sweep.slices, options.focus)
     valid = found.valid & aligned.seen
     if valid.mean() < LEAST_SURE_SHARE:
         raise QualityError(
@@ -175,12 +184,17 @@ def run_sweep_pair(
         geometry = ViewGeometry(plain.focal_px, plain.baseline_m, plain.doffs_px, plain.left.principal_px)
         span = 0.0, plain.disparity_max_px
     with clock.stage("all in focus"):
-        sharp = {side: find_focus(pictures, options.focus).all_in_focus for side, pictures in slices.items()}
+        sharp = {
+            side: pictures[0] if len(pictures) == 1 else find_focus(pictures, options.focus).all_in_focus
+            for side, pictures in slices.items()
+        }
     span = span or search_range(sharp["left"], sharp["right"], f"{left}, {right}")
     sha256 = ""
     with clock.stage("disparity"):
         if options.sweep.match == "network":
             found, sha256 = _by_network(sides, slices, geometry, options.sweep)
+        elif options.sweep.match == "pictures":
+            found, sha256 = _by_pictures(sharp["left"], sharp["right"], span, options.sweep)
         else:
             found = _by_matching(sharp["left"], sharp["right"], span)
     valid = found.valid & common_field(found.disparity, seen["left"], seen["right"])
@@ -211,7 +225,7 @@ def read_pair_rig(path: Path, options: SweepOptions) -> StereoRig:
 
 def _aligned(folder: Path, options: StackOptions, clock: StageClock, label: str) -> AlignedSweep:
     with clock.stage(f"read{label}") as progress:
-        sweep = read_sweep(folder, options.read, progress)
+        sweep = read_sweep(folder, options.read, progress, fewest=1 if options.sweep.match == "pictures" else 2)
     with clock.stage(f"align{label}") as progress:
         return align_sweep(sweep, options.align, progress)
 
@@ -250,6 +264,24 @@ def _by_matching(left: Rgb, right: Rgb, span: tuple[float, float]) -> DisparityM
     return DisparityMap(disparity, sure & smooth.valid, left)
 
 
+def _by_pictures(left: Rgb, right: Rgb, span: tuple[float, float], options: SweepOptions) -> tuple[DisparityMap, str]:
+    from lfstereo.network.estimate import estimate_from_pictures, load_network
+
+    network = load_network(options.model, options.device)
+    return estimate_from_pictures(left, right, span[1], network), network.card.sha256
+
+
+def _focus_by_network(slices: Float32, options: SweepOptions, source: str) -> FocusIndex:
+    """Let a network judge one sweep; its confidence is 1 where it expects no error, and falls by e with every slice."""
+    from lfstereo.network.estimate import estimate_from_one_stack, load_network
+
+    stack = FocalStack(slices, -np.arange(len(slices), dtype=np.float32), 0.0, source)
+    found = estimate_from_one_stack(stack, load_network(options.model, options.device))
+    assert found.uncertainty_px is not None
+    index: Float32 = np.clip(-found.disparity, 0, len(slices) - 1)
+    return FocusIndex(index, np.exp(-found.uncertainty_px), found.valid, found.all_in_focus)
+
+
 def _by_network(
     sides: dict[str, AlignedSweep],
     slices: dict[str, Float32],
@@ -267,6 +299,8 @@ def _by_network(
         focused = geometry.focal_px * geometry.baseline_m * vergence(sweep) - geometry.doffs_px
         ratio = (sweep.lens.aperture_m or 0.0) / geometry.baseline_m
         fewest, most = slice_limits(network.module)
-        count = min(max(len(slices[side]), fewest), most)
-        stacks.append(even_stack(slices[side], focused, ratio, sweep.source, count))
+        if fewest == most:
+            stacks.append(even_stack(slices[side], focused, ratio, sweep.source, most))
+        else:
+            stacks.append(FocalStack(slices[side], focused.astype(np.float32), ratio, sweep.source))
     return estimate_disparity(stacks[0], stacks[1], network), network.card.sha256

@@ -103,6 +103,15 @@ def test_one_sweep_with_distances(one: Path, tmp_path: Path, method: str, capsys
     assert table["stack"]["distances_m"][0] == pytest.approx(1.0)
 
 
+def test_one_sweep_by_the_network(one: Path, tmp_path: Path) -> None:
+    folders = [tmp_path / "network", tmp_path / "method"]
+    assert main(["depth", str(one / "sweep"), "--judge", "network", "--device", "cpu", "-o", str(folders[0])]) == 0
+    assert main(["depth", str(one / "sweep"), "-o", str(folders[1])]) == 0
+    (by_network, sure), (by_method, valid) = (read_pfm(folder / "slice_index.pfm") for folder in folders)
+    assert (sure & valid).mean() > 0.3
+    assert np.median(np.abs(by_network - by_method)[sure & valid]) < 0.5  # slices
+
+
 def test_one_sweep_without_distances(one: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["depth", str(one / "sweep"), "-o", str(tmp_path / "out")]) == 0
     assert "do not tell their focus distances" in capsys.readouterr().out
@@ -133,6 +142,16 @@ def test_two_dense_sweeps_by_the_network(tmp_path: Path) -> None:
     disparity, valid = read_pfm(tmp_path / "out" / "disparity.pfm")
     assert np.median(np.abs(disparity - 30)[valid]) < 2  # px
     assert len(tomllib.loads((tmp_path / "out" / "run.toml").read_text("utf-8"))["sha256"]["weights"]) == 64
+
+
+def test_two_ordinary_pictures_by_the_network(tmp_path: Path) -> None:
+    wide = board()
+    for side, first in (("left", 10), ("right", 40)):
+        write_sweep(tmp_path / side, wide[:, first : first + SIZE[1]], np.full(SIZE, 30.0), np.array([30.0]))
+    arguments = [str(tmp_path / "left"), str(tmp_path / "right"), "--match", "pictures", "--device", "cpu"]
+    assert main(["depth", *arguments, "-o", str(tmp_path / "out")]) == 0
+    disparity, valid = read_pfm(tmp_path / "out" / "disparity.pfm")
+    assert valid.mean() > 0.5 and np.median(np.abs(disparity - 30)[valid]) < 1  # px
 
 
 def test_two_sweeps_of_toed_in_cameras(two: Path, tmp_path: Path) -> None:
