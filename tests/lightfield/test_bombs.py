@@ -14,8 +14,10 @@ import h5py
 import numpy as np
 import pytest
 
+from lfstereo.container import expansion
 from lfstereo.errors import ContainerError
 from lfstereo.lightfield import LightField, read_light_field, write_light_field
+from lfstereo.lightfield.interchange import mat5
 from lfstereo.lightfield.interchange.lftoolbox_mat import write_decoded_mat
 
 HEADROOM_BYTES = 1 << 30
@@ -92,12 +94,13 @@ def test_text_beside_the_views_of_a_mat_file(tmp_path: Path) -> None:
     refused(path, "'lfstereo' does not lie whole in this file")
 
 
-def test_compressed_mat_file(tmp_path: Path) -> None:
-    path = tmp_path / "a.mat"
-    compressor = zlib.compressobj()
-    packed = b"".join(compressor.compress(bytes(1 << 20)) for _ in range(300)) + compressor.flush()
+def test_compressed_mat_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """With a limit of 1 MiB instead of 256, so that the test is short."""
+    for module in (expansion, mat5):
+        monkeypatch.setattr(module, "ALWAYS_ALLOWED_BYTES", 1 << 20)
+    path, packed = tmp_path / "a.mat", zlib.compress(bytes(3 << 20))
     path.write_bytes(bytes(126) + b"IM" + struct.pack("<II", 15, len(packed)) + packed)
-    refused(path, r"a\.mat: says that its \d+ bytes hold \d+, expected at most 268435456")
+    refused(path, r"a\.mat: says that its \d+ bytes hold 1048577, expected at most 1048576")
 
 
 @pytest.mark.parametrize(

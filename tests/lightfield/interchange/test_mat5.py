@@ -51,7 +51,7 @@ def test_the_other_byte_order_and_numbers_in_fewer_bytes(tmp_path: Path) -> None
         (145, b"\x08", "is no array of real numbers"),
         (160, b"\xff\xff\xff\x7f", "LF of size 2147483647 x 3 x 4 holds 48 bytes"),
         (160, b"\xff\xff\xff\xff", "LF of size -1 x 3 x 4 holds 48 bytes"),
-        (156, b"\x03", "LF without flags or dimensions"),
+        (140, b"\x04", "LF without flags or dimensions"),
     ],
 )
 def test_heads_that_lie(tmp_path: Path, at: int, value: bytes, message: str) -> None:
