@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+import io
 import json
 import os
 import shutil
@@ -9,6 +11,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -16,7 +19,9 @@ from typing import Any
 import pytest
 
 from lfstereo.assets import asset_folder
+from lfstereo.batch import conversion
 from lfstereo.batch.record import read_record
+from lfstereo.cli.main import main
 
 HERE = Path(__file__).parent
 PATIENCE_S = 900.0
@@ -70,28 +75,40 @@ class Site:
                 path.parent.mkdir(parents=True, exist_ok=True)
                 path.write_text(f"{name} {side}")
 
-    def start(self, *more: str, workers: int = 1) -> subprocess.Popen[str]:
-        """Start a batch with the stub's conversion."""
-        words = ["batch", str(self.folder / "captures"), "--rig", str(self.folder / "rig.toml"), "-o", str(self.out)]
-        if "--scheduler" not in more:
-            words += ["--workers", str(workers)]
+    def words(self, *more: str) -> list[str]:
+        """Return the command line of a batch."""
+        places = [str(self.folder / "captures"), "--rig", str(self.folder / "rig.toml"), "-o", str(self.out)]
+        return ["batch", *places, *([] if "--scheduler" in more else ["--workers", "1"]), *more]
+
+    def start(self, *more: str, **settings: Any) -> subprocess.Popen[str]:
+        """Start a batch with the stub's conversion, as a process that can be killed."""
         process = subprocess.Popen(
-            [sys.executable, "-W", "error::UserWarning", str(HERE / "stub_work.py"), *words, *more],
+            [sys.executable, "-W", "error::UserWarning", str(HERE / "stub_work.py"), *self.words(*more)],
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
             start_new_session=True,
+            **settings,
         )
         self.started.append(process)
         return process
 
-    def run(self, *more: str, workers: int = 1) -> tuple[int, str]:
-        """Run a batch to its end; return exit code and all it printed."""
-        return end_of(self.start(*more, workers=workers))
+    def run(self, *more: str) -> tuple[int, str]:
+        """Run a batch from here to its end, its workers are processes; return exit code and all it printed."""
+        import stub_work
+
+        printed = io.StringIO()
+        with pytest.MonkeyPatch.context() as patch, redirect_stdout(printed), redirect_stderr(printed):
+            patch.setattr(conversion, "run_batch", functools.partial(conversion.run_batch, work=stub_work.STUB))
+            return main(self.words(*more)), printed.getvalue()
 
     def states(self) -> dict[str, str]:
         """Return what the record says of each pair."""
         return {name: entry.outcome.state for name, entry in read_record(self.out).entries.items()}
+
+    def attempts(self) -> dict[str, int]:
+        """Return how often each pair was begun."""
+        return {name: entry.outcome.attempt for name, entry in read_record(self.out).entries.items()}
 
     def reason(self, name: str) -> str:
         """Return why a pair failed."""
@@ -121,8 +138,9 @@ class Site:
 
 
 @pytest.fixture
-def site(tmp_path: Path) -> Iterator[Site]:
+def site(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Site]:
     """A place for a batch; its processes are gone at the end."""
+    monkeypatch.syspath_prepend(HERE)
     (tmp_path / "captures").mkdir()
     shutil.copy(asset_folder("calib") / "rigs" / "simulated-illum-20mm.toml", tmp_path / "rig.toml")
     found = Site(tmp_path)
