@@ -103,7 +103,7 @@ def run_batch(
 def _clean(request: BatchRequest, plan: Plan) -> None:
     """Remove what lost workers left of these pairs, in this batch or in one before."""
     output, whole = request.output, request.batch.shard_of()[1] == 1
-    names = ["*"] if whole else [glob.escape(pair.files.name) for pair in plan.pairs]
+    names = ["*"] if whole else [glob.escape(pair.files.name) for pair in plan.pairs] + [_camera_name(request, "*")]
     for name in names:
         for scratch in output.glob(f".{name}.????????.partial"):
             shutil.rmtree(scratch, ignore_errors=True)  # a cluster's worker may be writing there still
@@ -190,9 +190,16 @@ def _camera_jobs(request: BatchRequest, plan: Plan) -> list[CameraJob]:
                 cameras.setdefault(camera_key(capture.metadata, request.whites), capture)
     token, batch = secrets.token_hex(8), request.batch
     return [
-        CameraJob(f"camera {number}", request.output, token, 0, batch.time_limit_s, capture.path, request.whites)
+        CameraJob(
+            _camera_name(request, number), request.output, token, 0, batch.time_limit_s, capture.path, request.whites
+        )
         for number, capture in enumerate(cameras.values())
     ]
+
+
+def _camera_name(request: BatchRequest, number: object) -> str:
+    part, parts = request.batch.shard_of()
+    return f"camera {number} of shard {part}-{parts}"
 
 
 def _finish(request: BatchRequest, plan: Plan, outcomes: dict[str, Outcome], stopped: str) -> BatchReport:
