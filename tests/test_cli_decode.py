@@ -30,10 +30,12 @@ def folder(tmp_path: Path, draw_frame: Callable[..., Any]) -> Path:
     return tmp_path
 
 
-def test_decode_writes_light_field_and_picture(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_decode_writes_light_field_and_picture(folder: Path, capsys: pytest.CaptureFixture[str], offline: None) -> None:
     out = folder / "scene.h5"
     assert main(["decode", str(folder / "photo.LFR"), "--whites", str(folder / "whites"), "-o", str(out)]) == 0
     assert read_light_field(out).views.shape == (15, 15, 24, 27, 3)
+    assert read_light_field(out).serial == "#fb1c"  # the mark of SIM1
+    assert b"SIM1" not in out.read_bytes()
     assert cv2.imread(str(folder / "scene.png")) is not None
     printed = capsys.readouterr()
     assert "views 15 x 15 of 27 x 24 px" in printed.out
