@@ -12,6 +12,7 @@ import cv2
 import numpy as np
 import pytest
 import tifffile
+from threadpoolctl import threadpool_limits
 
 from lfstereo.cli.main import main
 from lfstereo.depth import pictures
@@ -19,6 +20,7 @@ from lfstereo.depth.pfm import read_pfm
 from lfstereo.depth.ply import read_ply
 from lfstereo.depth.png16 import read_disparity_png
 from lfstereo.errors import QualityWarning
+from lfstereo.outputs import portable_name
 from lfstereo.pipeline import open_light_field
 from lfstereo.rig.rig import PlenopticCamera, StereoRig, write_rig
 
@@ -98,6 +100,25 @@ def test_writes_everything(result: Path) -> None:
     assert len(record["sha256"]["weights"]) == 64
     assert record["error"]["lfstereo"]["mae_px"] < SMALL_MAE_PX
     assert "SIM0000" not in (result / "run.toml").read_text()
+
+
+def test_offline_on_one_thread_the_same_bytes_come_out(pair: Path, result: Path, offline: None) -> None:
+    """All but the times in run.toml and on the page; no connection is opened, no name looked up."""
+    out = pair.parent / "again"
+    with threadpool_limits(1):
+        assert main(words(pair, out, "--truth", str(pair / "truth"))) == 0
+    timed = {"run.toml", "report.html"}
+    files = [path.relative_to(result) for path in sorted(result.rglob("*")) if path.is_file()]
+    assert len(files) > 40
+    assert all(portable_name(part) == part for file in files for part in file.parts)
+    assert len({str(file).lower() for file in files}) == len(files)
+    different = [str(f) for f in files if f.name not in timed and (result / f).read_bytes() != (out / f).read_bytes()]
+    assert different == []
+    first, second = (tomllib.loads((folder / "run.toml").read_text()) for folder in (result, out))
+    for record in (first, second):
+        for table in ("seconds", "peak_gib"):
+            record.pop(table, None)
+    assert first == second
 
 
 def test_json_summary_of_decoded_light_fields_is_the_same_map(
