@@ -73,9 +73,7 @@ def cues(folders: list[Path], ratio: float, network: Network) -> None:
             if name == CUES[0]:
                 foretold.append(found.uncertainty_px[case.known])
         plain.append(plain_surfaces(encode(case.sharp, exposure))[case.known])
-    print(
-        f"\n{len(scenes)} photographed scenes, D/B = {ratio}: mean over scenes; {share(plain):.0%} are plain"
-    )
+    print(f"\n{len(scenes)} photographed scenes, D/B = {ratio}: mean over scenes; {share(plain):.0%} are plain")
     print(f"{'':<18}{'MAE px':>8}{'bad 2':>8}{'plain: MAE':>12}{'bad 2':>8}")
     for name, found in errors.items():
         on_plain = [e[p] for e, p in zip(found, plain, strict=True) if p.any()]

@@ -20,6 +20,7 @@ from lfstereo.lightfield.calibration import decode_photograph
 from lfstereo.lightfield.field import LightField, in_srgb
 from lfstereo.lightfield.samples import ViewSamples, sample_views
 from lfstereo.lightfield.store import read_light_field
+from lfstereo.network.shipped import DEFAULT_MODEL
 from lfstereo.options import option
 from lfstereo.progress import Progress, StageClock, silent
 from lfstereo.rig.geometry import RectifiedGeometry, Side, rectified_geometry
@@ -38,7 +39,7 @@ class RunOptions:
     """How a pair is turned into depth."""
 
     slices: int = option(SLICES_DEFAULT, "slices of each focal stack")
-    model: str = option("bdffnet-r16-v1", "name of a shipped model, or its folder")
+    model: str = option(DEFAULT_MODEL, "name of a shipped model, or its folder")
     device: Literal["auto", "cpu", "cuda"] = option("auto", "where the network runs")
     any_zoom: bool = option(False, "accept captures at another zoom or focus than the rig was calibrated at")
     any_camera: bool = option(False, "accept captures of cameras with other serial numbers than the rig's")

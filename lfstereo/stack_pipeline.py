@@ -21,6 +21,7 @@ from lfstereo.focus.measures import FocusIndex, FocusOptions, find_focus
 from lfstereo.focus.stack import FocalStack
 from lfstereo.focus.sweep import depth_at, vergence
 from lfstereo.lightfield.field import LightField, ViewSampling
+from lfstereo.network.shipped import DEFAULT_MODEL
 from lfstereo.options import option
 from lfstereo.pipeline import common_field
 from lfstereo.progress import StageClock
@@ -53,7 +54,7 @@ class SweepOptions:
     doffs_px: float = option(0.0, "difference of their principal points, right minus left, where no rig tells", "px")
     near_m: float | None = option(None, "near end of the scene, for a rig in an OpenCV file", "m")
     far_m: float | None = option(None, "far end of the scene, for a rig in an OpenCV file", "m")
-    model: str = option("bdffnet-r16-v1", "network: name of a shipped model, or its folder")
+    model: str = option(DEFAULT_MODEL, "network: name of a shipped model, or its folder")
     device: Literal["auto", "cpu", "cuda"] = option("auto", "where the network runs")
 
 

@@ -28,7 +28,7 @@ from lfstereo.progress import Progress, silent
 
 LOWEST_PX = -1.0
 """Smallest focus disparity (px) that a stack may have: stereo finds nothing below 0."""
-UNSURE_PX = 2.0
+UNSURE_PX = 3.0
 """Expected error (px) above which a pixel is not valid."""
 
 
@@ -47,7 +47,7 @@ def load_network(name: str | Path = DEFAULT_MODEL, device: Literal["auto", "cpu"
     Parameters
     ----------
     name
-        Such as ``"bdffnet-r16-v1"``.
+        Such as ``"binocular-v1"``.
     device
         ``"auto"`` takes CUDA where there is any.
 

@@ -11,6 +11,7 @@ from safetensors.torch import load_file, save_file
 from lfstereo.errors import AssetError, OutputError
 from lfstereo.network.bdff_net import Architecture, BdffNet
 from lfstereo.network.card import Metric, ModelCard, Training, read_card, write_card
+from lfstereo.network.estimate import slice_limits
 from lfstereo.network.shipped import CARD, DEFAULT_MODEL, WEIGHTS, find_model
 from lfstereo.network.weights import load_model, save_model
 
@@ -136,12 +137,13 @@ def test_unknown_model() -> None:
         find_model("nothing-v9")
 
 
-def test_shipped_model_loads_and_is_small() -> None:
-    folder = find_model(DEFAULT_MODEL)
+@pytest.mark.parametrize("name", [DEFAULT_MODEL, "bdffnet-r16-v1", "bdffnet-paper-r16-v1"])
+def test_shipped_models_load_and_are_small(name: str) -> None:
+    folder = find_model(name)
     network, found = load_model(folder)
-    assert f"{found.name}-v{found.version}" == DEFAULT_MODEL
+    assert f"{found.name}-v{found.version}" == name
     assert found.licence == "BSD-3-Clause"
-    assert network.architecture.slices == 16
+    assert slice_limits(network) == ((5, 64) if name == DEFAULT_MODEL else (16, 16))
     assert all(path.stat().st_size < 16e6 for path in folder.iterdir())
 
 

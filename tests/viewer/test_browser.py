@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from lfstereo.conventions import depth_from_disparity
+from lfstereo.network.shipped import DEFAULT_MODEL
 from lfstereo.viewer.server import PageServer
 from lfstereo.viewer.shelf import find_items
 
@@ -157,7 +158,7 @@ def test_dark_and_light(result: Page) -> None:
 
 def test_tells_figures_and_files(result: Page) -> None:
     text = result.text("sheets")
-    for expected in ("Figures", "sure where the network tells", "mesh.glb", "bdffnet-r16-v1", "write results"):
+    for expected in ("Figures", "sure where the network tells", "mesh.glb", DEFAULT_MODEL, "write results"):
         assert expected.lower() in text.lower()
     assert result.text("title") == "left <b>.h5 / right & co.h5"
 
