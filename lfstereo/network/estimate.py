@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
+import cv2
 import numpy as np
 import torch
 from torch import Tensor
@@ -28,8 +29,8 @@ from lfstereo.progress import Progress, silent
 
 LOWEST_PX = -1.0
 """Smallest focus disparity (px) that a stack may have: stereo finds nothing below 0."""
-UNSURE_PX = 3.0
-"""Expected error (px) above which a pixel is not valid."""
+UNSURE_PX = 4.0
+"""Expected error (px), the median of 5 x 5 px, above which a pixel is not valid."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -186,13 +187,13 @@ def estimate_from_pictures(left: Rgb, right: Rgb, near_px: float, network: Netwo
 
 def binocular_map(refined: Refined, front: Front, size: tuple[int, int], exposure: float) -> DisparityMap:
     """Cut what the binocular network found to the picture's size, and say where it is sure."""
-    error = np.exp(cropped(refined.log_error, size)[0])
+    error = np.ascontiguousarray(np.exp(cropped(refined.log_error, size)[0]), np.float32)
     sharp = np.moveaxis(cropped(front.sharp, size), 0, -1)
     return DisparityMap(
         disparity=np.maximum(cropped(refined.disparity, size)[0], 0),
-        valid=error <= UNSURE_PX,
+        valid=cv2.medianBlur(error, 5) <= UNSURE_PX,
         all_in_focus=np.ascontiguousarray(decode(np.clip(sharp, 0, 1), exposure)),
-        uncertainty_px=np.ascontiguousarray(error, np.float32),
+        uncertainty_px=error,
     )
 
 

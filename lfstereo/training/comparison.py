@@ -31,7 +31,7 @@ NETWORKS = ("Focus-Net", "Focus-Net-Guided", "Stereo-Net", "BDfF-Net")
 BASELINES = ("SGBM", "SGBM+WLS filled", "depth from focus")
 EDOF = "EDoF-Net"
 SURE = "binocular, sure"
-"""The same, judged where it does not expect an error above 3 px."""
+"""The same, judged where it does not expect an error above 4 px."""
 WLS_ON_EDOF = "SGBM+WLS on EDoF"
 """Classical stereo on the two images of EDoF-Net: it sees no more than the networks do."""
 

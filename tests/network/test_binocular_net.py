@@ -1,5 +1,6 @@
 """The binocular focus volume: parts with known answers, and a planted disparity that needs no training to be found."""
 
+import cv2
 import numpy as np
 import pytest
 import torch
@@ -117,7 +118,7 @@ def test_two_stacks_of_any_spacing(network: Network) -> None:
     found = estimate_disparity(stack_of(left, uneven), stack_of(right, uneven), network)
     assert found.disparity.shape == (40, 80) and found.uncertainty_px is not None
     assert float(np.median(np.abs(found.disparity[:, SHIFT:70] - SHIFT))) < 2.5  # untrained corrections reach 2 px
-    assert np.array_equal(found.valid, found.uncertainty_px <= 3.0)
+    assert np.array_equal(found.valid, cv2.medianBlur(found.uncertainty_px, 5) <= 4.0)
     assert np.allclose(found.all_in_focus, np.clip(left, 0, None), atol=0.02)
 
 
