@@ -15,6 +15,7 @@ import pytest
 from lfstereo.batch.record import read_record
 from lfstereo.cli.main import main
 from lfstereo.container import read_capture, write_capture
+from lfstereo.container.serials import camera_mark
 from lfstereo.depth.pfm import read_pfm
 
 SAME_PX = 0.01
@@ -57,7 +58,7 @@ def test_good_pairs_are_converted_and_bad_ones_named(converted: Path) -> None:
     assert {path.name for path in converted.iterdir() if path.is_dir()} == {".batch", "first", "second"}
     entries = read_record(converted).entries
     assert entries["first"].outcome.state == entries["second"].outcome.state == "done"
-    assert "B5000000000" in entries["stranger"].outcome.reason
+    assert f"taken by camera {camera_mark('B5000000000')}" in entries["stranger"].outcome.reason
     assert "right.LFR: byte" in entries["truncated"].outcome.reason
     assert set(entries["first"].outcome.inputs) == {"left", "right", "rig", "truth", "white left", "white right"}
     assert not list((converted / ".batch" / "notes").iterdir())
