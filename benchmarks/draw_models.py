@@ -43,7 +43,7 @@ def panels(index: int, models: list[str]) -> list[np.ndarray]:
         error = np.abs(found - case.disparity)
         bad = np.mean(error[case.known] > 2)
         drawn = coloured(np.where(case.known, error, 0), WORST_PX, cv2.COLORMAP_INFERNO)
-        cv2.putText(drawn, f"{error[case.known].mean():.2f} px, {bad:.0%} > 2", (6, 20), 0, 0.6, (255, 255, 255), 1, 16)
+        cv2.putText(drawn, f"{error[case.known].mean():.2f} px, {bad:.0%} > 2", (8, 40), 0, 1.1, (255, 255, 255), 2, 16)
         row += [coloured(found, top, cv2.COLORMAP_TURBO), drawn]
     return row
 

@@ -192,7 +192,9 @@ def _report(
         disparity_px=None if disparity is None else span(disparity, valid),
         points=points,
         moved_px=max(float(side.moved_px.max()) for side in aligned),
-        least_correlation=min(float(side.correlation.min()) for side in aligned),
+        least_correlation=min(
+            (float(side.correlation.min()) for side in aligned if side.correlation.size), default=1.0
+        ),
         seconds=dict(clock.seconds),
     )
 

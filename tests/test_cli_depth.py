@@ -210,7 +210,7 @@ def test_refuses_pairs_that_do_not_fit(
     known = ("--baseline-m", "0.1", "--focal-px", "400", "--distances", two / "focus.csv")
     assert "expected --rig, or --baseline-m" in refusal(capsys, 3, *pair, "--metric", *out)
     assert "network: found no geometry" in refusal(capsys, 3, *pair, "--match", "network", *out)
-    line = refusal(capsys, 3, *pair, *known, "--match", "network", *out)
+    line = refusal(capsys, 3, *pair, *known, "--match", "network", "--model", "bdffnet-r16-v1", *out)
     assert "found slices up to 2.50 px of disparity apart, expected at most 0.67 px" in line
     assert "swap the two sweeps" in refusal(capsys, 4, *pair[::-1], *out)
     rig = tmp_path / "cameras.yml"

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from lfstereo.container import Capture, write_capture
+from lfstereo.container.serials import camera_mark
 from lfstereo.errors import AssetError, GridFitError
 from lfstereo.lenslet import choice, remembered_grid
 from lfstereo.lenslet.choice import choose_grid
@@ -159,7 +160,7 @@ def test_unknown_serial_takes_the_camera_that_fits(
 def test_one_white_image(tmp_path: Path, whites: Path, camera_files: SimpleNamespace, frames: SimpleNamespace) -> None:
     photograph = at(frames.photograph[0], camera_files, 0)
     assert choose_grid(photograph, whites / "MOD_0000.RAW").grid.source == "white image"
-    with pytest.raises(AssetError, match="expected SIM9"):
+    with pytest.raises(AssetError, match=f"expected {camera_mark('SIM9')}"):
         choose_grid(replace(photograph, metadata=replace(photograph.metadata, serial="SIM9")), whites / "MOD_0000.RAW")
 
 
