@@ -12,9 +12,9 @@ import cv2
 import numpy as np
 import pytest
 import tifffile
-from threadpoolctl import threadpool_limits
 
 from lfstereo.cli.main import main
+from lfstereo.container.serials import camera_mark
 from lfstereo.depth import pictures
 from lfstereo.depth.pfm import read_pfm
 from lfstereo.depth.ply import read_ply
@@ -84,7 +84,7 @@ def test_writes_everything(result: Path) -> None:
     png, png_known = read_disparity_png(result / "disparity.png")
     valid = cv2.imread(str(result / "valid.png"), cv2.IMREAD_UNCHANGED) == 255
     np.testing.assert_array_equal(known, valid)
-    assert valid.mean() > 0.4
+    assert valid.mean() > 0.2  # both cameras see it and the network is sure, on 125 x 87 px
     np.testing.assert_allclose(png[png_known], disparity[png_known], atol=1 / 256)
     record = tomllib.loads((result / "run.toml").read_text())
     geometry = record["geometry"]
@@ -102,11 +102,10 @@ def test_writes_everything(result: Path) -> None:
     assert "SIM0000" not in (result / "run.toml").read_text()
 
 
-def test_offline_on_one_thread_the_same_bytes_come_out(pair: Path, result: Path, offline: None) -> None:
+def test_offline_the_same_bytes_come_out(pair: Path, result: Path, offline: None) -> None:
     """All but the times in run.toml and on the page; no connection is opened, no name looked up."""
     out = pair.parent / "again"
-    with threadpool_limits(1):
-        assert main(words(pair, out, "--truth", str(pair / "truth"))) == 0
+    assert main(words(pair, out, "--truth", str(pair / "truth"))) == 0
     timed = {"run.toml", "report.html"}
     files = [path.relative_to(result) for path in sorted(result.rglob("*")) if path.is_file()]
     assert len(files) > 40
@@ -223,7 +222,7 @@ def test_raw_capture_without_white_images(pair: Path, tmp_path: Path, capsys: py
 
 def test_captures_swapped(pair: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     line = refused(capsys, words(pair, tmp_path / "out", left=pair / "right.LFR", right=pair / "left.LFR"))
-    assert "SIM00000002" in line
+    assert camera_mark("SIM00000002") in line
 
 
 def test_rig_of_other_cameras(pair: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -231,7 +230,7 @@ def test_rig_of_other_cameras(pair: Path, tmp_path: Path, capsys: pytest.Capture
     rig.write_text((pair / "rig.toml").read_text().replace("SIM00000002", "B5143909630"))
     arguments = words(pair, tmp_path / "out")
     arguments[arguments.index("--rig") + 1] = str(rig)
-    assert "B5143909630" in refused(capsys, arguments)
+    assert camera_mark("B5143909630") in refused(capsys, arguments)
 
 
 def test_rig_of_another_zoom(pair: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -242,7 +241,7 @@ def test_rig_of_another_zoom(pair: Path, tmp_path: Path, capsys: pytest.CaptureF
     arguments = words(pair, tmp_path / "out")
     arguments[arguments.index("--rig") + 1] = str(rig)
     assert "left.LFR: taken at zoom step 105, but the rig's left" in refused(capsys, arguments)
-    assert "the rig's right camera is B5143909630" in refused(capsys, [*arguments, "--any-zoom"]), (
+    assert f"the rig's right camera is {camera_mark('B5143909630')}" in refused(capsys, [*arguments, "--any-zoom"]), (
         "the left is accepted"
     )
 
@@ -283,7 +282,7 @@ def test_bad_options(pair: Path, tmp_path: Path, capsys: pytest.CaptureFixture[s
     config = tmp_path / "run.toml"
     config.write_text("[run]\nslcies = 3\n")
     assert "'slcies' is not an option" in refused(capsys, words(pair, tmp_path / "out", "--config", str(config)))
-    assert "slices = 1, expected 16" in refused(capsys, words(pair, tmp_path / "out", "--slices", "1"))
+    assert "slices = 1, expected 5 to 64" in refused(capsys, words(pair, tmp_path / "out", "--slices", "1"))
     assert "nosuch" in refused(capsys, words(pair, tmp_path / "out", "--model", "nosuch"))
 
 
