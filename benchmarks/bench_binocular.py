@@ -41,7 +41,7 @@ from lfstereo.simulate.stereo_scenes import find_scenes
 from lfstereo.simulate.virtual_dslr import VirtualDslrOptions
 from lfstereo.training.atlas import mixed_bank
 from lfstereo.training.comparison import photographed_cases
-from lfstereo.training.evaluate import CUES, HELD_OUT_SEED
+from lfstereo.training.evaluate import ABLATIONS, HELD_OUT_SEED
 from lfstereo.training.generated_dataset import dual_stack_of
 from lfstereo.training.samples import stack_sample
 
@@ -58,19 +58,19 @@ def cues(folders: list[Path], ratio: float, network: Network) -> None:
     """Compare both cues with either alone, on photographs and on their plain surfaces."""
     assert isinstance(network.module, BinocularNet)
     scenes = [scene for folder in folders for scene in find_scenes(folder, None)]
-    errors: dict[str, list[np.ndarray]] = {name: [] for name in CUES}
+    errors: dict[str, list[np.ndarray]] = {name: [] for name in ABLATIONS}
     plain, foretold = [], []
     options = PhotographOptions(aperture_ratio=ratio)
     for case in photographed_cases(scenes, options, VirtualDslrOptions()):
         exposure = exposure_of(case.left.slices, case.right.slices)
         left, right = (encoded_stack(stack, exposure, network) for stack in (case.left, case.right))
         foci = torch.from_numpy(np.asarray(case.left.disparities_px, np.float32))
-        for name, (other, use_focus) in zip(CUES, ((right, True), (right, False), (None, True)), strict=True):
+        for name, (other, use_focus) in zip(ABLATIONS, ((right, True), (right, False), (None, True)), strict=True):
             with torch.inference_mode():
                 refined, front = network.module(left, other, foci, use_focus)
             found = binocular_map(refined, front, case.disparity.shape, 1.0)
             errors[name].append(np.abs(found.disparity - case.disparity)[case.known])
-            if name == CUES[0]:
+            if name == ABLATIONS[0]:
                 foretold.append(found.uncertainty_px[case.known])
         plain.append(plain_surfaces(encode(case.sharp, exposure))[case.known])
     print(f"\n{len(scenes)} photographed scenes, D/B = {ratio}: mean over scenes; {share(plain):.0%} are plain")
@@ -79,7 +79,7 @@ def cues(folders: list[Path], ratio: float, network: Network) -> None:
         on_plain = [e[p] for e, p in zip(found, plain, strict=True) if p.any()]
         figures = [mean(found), bad(found), mean(on_plain), bad(on_plain)]
         print(f"{name:<18}{figures[0]:>8.3f}{figures[1]:>8.1%}{figures[2]:>12.3f}{figures[3]:>8.1%}")
-    sparsification(np.concatenate(errors[CUES[0]]), np.concatenate(foretold))
+    sparsification(np.concatenate(errors[ABLATIONS[0]]), np.concatenate(foretold))
 
 
 def sparsification(error: np.ndarray, foretold: np.ndarray) -> None:

@@ -21,7 +21,7 @@ from lfstereo.simulate.stack_dataset import DualStack, read_dual_stack
 from lfstereo.simulate.stereo_scenes import SceneFiles, read_scene
 from lfstereo.simulate.synthesis import photograph
 from lfstereo.simulate.virtual_dslr import VirtualDslrOptions
-from lfstereo.training.evaluate import CUES
+from lfstereo.training.evaluate import ABLATIONS
 from lfstereo.training.generated_dataset import dual_stack_of
 from lfstereo.training.rows import Row, psnr_db, score_row, wls_filled
 from lfstereo.training.samples import stack_sample
@@ -130,14 +130,14 @@ def _binocular_rows(case: DualStack, network: Network, module: BinocularNet) -> 
     foci = torch.from_numpy(np.asarray(case.left.disparities_px, np.float32)).to(network.device)
     size = (case.disparity.shape[0], case.disparity.shape[1])
     rows: list[Row] = []
-    for name, other, use_focus in zip(CUES, (right, right, None), (True, False, True), strict=True):
+    for name, other, use_focus in zip(ABLATIONS, (right, right, None), (True, False, True), strict=True):
         started = time.perf_counter()
         with torch.inference_mode():
             refined, front = module(left, other, foci, use_focus)
         found = binocular_map(refined, front, size, 1.0)
         spent = time.perf_counter() - started
         rows.append(score_row(case, name, found.disparity, spent))
-        if name == CUES[0]:
+        if name == ABLATIONS[0]:
             rows.append(score_row(case, SURE, found.disparity, spent, found.valid))
             picture = encode(found.all_in_focus, 1.0)
             psnr = psnr_db(picture, encode(case.sharp, exposure), case.known)

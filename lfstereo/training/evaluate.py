@@ -26,7 +26,7 @@ from lfstereo.training.textures import texture_bank
 HELD_OUT_SEED = 900_001
 """Scenes and textures of this seed are never trained on."""
 BAD_PX = (1.0, 2.0, 4.0)
-CUES = ("binocular", "without focus", "without stereo")
+ABLATIONS = ("binocular", "without focus", "without stereo")
 """What the binocular network is given."""
 
 
@@ -72,7 +72,7 @@ def evaluate(network: AnyNetwork, samples: Sequence[StackSample], progress: Prog
         for part, disparity in maps.items():
             error = np.abs(disparity - wanted)
             errors.setdefault(part, []).append(error[valid])
-            if part in ("stereo", "fused", *CUES[:2]):
+            if part in ("stereo", "fused", *ABLATIONS[:2]):
                 errors.setdefault(f"{part}_visible", []).append(error[valid & _in_both(wanted)])
         truth.append(wanted[valid])
         progress(index + 1, len(samples))
@@ -100,7 +100,7 @@ def _maps(network: AnyNetwork, left: Tensor, right: Tensor) -> dict[str, Float32
         foci = torch.from_numpy(SLICE_DISPARITIES)
         given = ((right, True), (right, False), (None, True))
         found = [network(left, other, foci, use_focus)[0].disparity[0, 0].numpy() for other, use_focus in given]
-        return dict(zip(CUES, found, strict=True))
+        return dict(zip(ABLATIONS, found, strict=True))
     pair = network(left, right)
     parts = {"focus": pair.focus, "guided": pair.guided, "stereo": pair.stereo.final, "fused": pair.fused}
     if pair.stereo.joint is not None:

@@ -20,7 +20,7 @@ from lfstereo.network.card import LICENCE, Metric, ModelCard, Training
 from lfstereo.network.families import AnyArchitecture, build
 from lfstereo.network.weights import load_model, save_model
 from lfstereo.training.checkpoint import FOLDER, Counters, read_weights
-from lfstereo.training.evaluate import BAD_PX, CUES, HELD_OUT_SEED, edof_mae, evaluate, held_out
+from lfstereo.training.evaluate import ABLATIONS, BAD_PX, HELD_OUT_SEED, edof_mae, evaluate, held_out
 from lfstereo.training.recipe import read_recipe
 
 DATA = (
@@ -129,7 +129,7 @@ def measure(folder: Path, count: int, height: int = 192, width: int = 320) -> Mo
     metrics: list[Metric] = []
     for row in evaluate(network, samples):
         metrics.append(Metric(f"{row.part}: mean absolute disparity error", round(row.mae_px, 2), "px", where, command))
-        if row.part in ("stereo", "fused", CUES[0]):
+        if row.part in ("stereo", "fused", ABLATIONS[0]):
             shares = zip(BAD_PX, row.bad, strict=True)
             metrics.extend(
                 Metric(f"{row.part}: pixels off by more than {limit:.0f} px", round(100 * bad, 1), "%", where, command)

@@ -12,7 +12,7 @@ from lfstereo.network.binocular_net import BinocularArchitecture, BinocularNet
 from lfstereo.network.weights import load_model
 from lfstereo.training.batches import PoolBatches
 from lfstereo.training.binocular_losses import seen_by_both, vary_slices
-from lfstereo.training.evaluate import CUES, evaluate, held_out
+from lfstereo.training.evaluate import ABLATIONS, evaluate, held_out
 from lfstereo.training.fronts import FrontBatches, fill_fronts
 from lfstereo.training.loop import train
 from lfstereo.training.pool import fill_pool, open_pool
@@ -149,4 +149,4 @@ def test_recipes_from_a_pool_to_a_model(pool: Path, tmp_path: Path) -> None:
     network, card = load_model(model)
     assert isinstance(network, BinocularNet) and card.training.stages[0].startswith("match: 3 steps")
     rows = evaluate(network, held_out(1, 64, 128, 0.2, 5))
-    assert {row.part for row in rows} > set(CUES)
+    assert {row.part for row in rows} > set(ABLATIONS)
