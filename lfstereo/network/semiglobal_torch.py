@@ -83,7 +83,7 @@ def _along(energy: Tensor, guide: Tensor, shift: int, weights: Penalties) -> Ten
     """Follow paths from the first row ``(B, H, W, D)`` to the last, each row ``shift`` columns off the one before."""
     rows = [energy[:, 0]]
     for y in range(1, energy.shape[1]):
-        before, level = _moved(rows[-1], shift, 0.0), _moved(guide[:, y - 1, :, None], shift, 0.0)[..., 0]
+        before, level = _moved(rows[-1], shift), _moved(guide[:, y - 1, :, None], shift)[..., 0]
         jump = (weights.large / (1 + (guide[:, y] - level).abs() / weights.edge)).clamp(min=weights.small)
         lowest = before.amin(2, keepdim=True)
         padded = F.pad(before, (1, 1), value=_FAR)
@@ -97,12 +97,12 @@ def _along(energy: Tensor, guide: Tensor, shift: int, weights: Penalties) -> Ten
     return torch.stack(rows, dim=1)
 
 
-def _moved(row: Tensor, shift: int, fill: float) -> Tensor:
-    """Row ``(B, W, D)`` whose column x holds column ``x + shift``."""
+def _moved(row: Tensor, shift: int) -> Tensor:
+    """Row ``(B, W, D)`` whose column x holds column ``x + shift``; 0 where there is none."""
     if shift == 0:
         return row
     pad = (0, 0, 1, 0) if shift < 0 else (0, 0, 0, 1)
-    wide = F.pad(row, pad, value=fill)
+    wide = F.pad(row, pad)
     return wide[:, :-1] if shift < 0 else wide[:, 1:]
 
 

@@ -1,5 +1,6 @@
 """Training of the binocular focus volume: what counts, what varies, what is cached, and steps that learn."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +21,7 @@ from lfstereo.training.publish import main as publish_main
 from lfstereo.training.recipe import Recipe
 from lfstereo.training.stages import LOSSES, TRAINED, select_parts
 
+FiveSteps = Callable[[torch.nn.Module, str, object], tuple[list[float], set[str]]]
 SMALL = BinocularArchitecture(slice_width=8, descriptor_width=8, refine_width=8)
 RECIPE = """
 seed = 1
@@ -77,24 +79,12 @@ def test_chosen_slices_keep_their_places() -> None:
 
 
 @pytest.mark.parametrize("stage", ["match", "slices", "refine"])
-def test_a_few_steps_reduce_the_loss(stage: str, pool: Path, fronts: Path) -> None:
+def test_a_few_steps_reduce_the_loss(stage: str, pool: Path, fronts: Path, five_steps: FiveSteps) -> None:
     torch.manual_seed(0)
-    torch.set_num_threads(1)
-    network = BinocularNet(SMALL)
-    before = {name: value.clone() for name, value in network.named_parameters()}
-    optimiser = torch.optim.AdamW(select_parts(network, stage), 1e-3)
     opened = open_pool(pool, 3, 64, 128, 1)
     source = FrontBatches(opened, recipe(stage, fronts=str(fronts))) if stage == "refine" else PoolBatches(opened, 1, 2)
-    batch = source(0)
-    losses = []
-    for _ in range(5):
-        optimiser.zero_grad()
-        loss = LOSSES[stage](network, batch)
-        loss.backward()
-        optimiser.step()
-        losses.append(float(loss.detach()))
+    losses, changed = five_steps(BinocularNet(SMALL), stage, source(0))
     assert min(losses[1:]) < losses[0]
-    changed = {name.split(".")[0] for name, value in network.named_parameters() if not torch.equal(value, before[name])}
     assert changed == set(TRAINED[stage])
 
 

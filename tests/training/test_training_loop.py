@@ -5,6 +5,7 @@ import math
 import os
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -31,9 +32,10 @@ from lfstereo.training.publish import main as publish_main
 from lfstereo.training.publish import measure, publish
 from lfstereo.training.recipe import Recipe, read_recipe
 from lfstereo.training.sources import Rings
-from lfstereo.training.stages import LOSSES, PARTS, TRAINED, select_parts
+from lfstereo.training.stages import LOSSES, PARTS, TRAINED
 from lfstereo.training.workers import join_workers
 
+FiveSteps = Callable[[torch.nn.Module, str, object], tuple[list[float], set[str]]]
 SMALL = Architecture(focus_width=4, edof_width=4, tail_width=4, stereo_width=16)
 SIZE = {"height": 64, "width": 64, "textures": 4, "batch": 2, "threads": 1}
 
@@ -101,22 +103,10 @@ def test_prefetching_passes_errors_on() -> None:
 
 
 @pytest.mark.parametrize("stage", sorted(set(LOSSES) - {"match", "slices", "refine"}))
-def test_a_few_steps_reduce_the_loss(stage: str, pool: tuple[Path, Pool]) -> None:
+def test_a_few_steps_reduce_the_loss(stage: str, pool: tuple[Path, Pool], five_steps: FiveSteps) -> None:
     torch.manual_seed(0)
-    torch.set_num_threads(1)
-    network = BdffNet(SMALL)
-    before = {name: value.clone() for name, value in network.named_parameters()}
-    optimiser = torch.optim.AdamW(select_parts(network, stage), 1e-3)
-    batch = PoolBatches(pool[1], 1, 2)(0)
-    losses = []
-    for _ in range(5):
-        optimiser.zero_grad()
-        loss = LOSSES[stage](network, batch)
-        loss.backward()
-        optimiser.step()
-        losses.append(float(loss.detach()))
+    losses, changed = five_steps(BdffNet(SMALL), stage, PoolBatches(pool[1], 1, 2)(0))
     assert min(losses[1:]) < losses[0]
-    changed = {name.split(".")[0] for name, value in network.named_parameters() if not torch.equal(value, before[name])}
     assert changed == set(TRAINED[stage])
 
 
