@@ -21,7 +21,7 @@ def resample_view(
     """Fill a rectified view and its weight.
 
     Light by cubic convolution, which reproduces straight and square courses of brightness, so that nothing is shifted;
-    not below 0, replicated at the border. Weight linearly, 0 beyond the border.
+    not below 0; black where the view does not reach. Weight linearly, 0 beyond the border.
 
     Parameters
     ----------
@@ -51,7 +51,10 @@ def resample_view(
             picture_x, picture_y = b1 + gain * off_x, b2 + gain * off_y
             x = n[0, 0] * picture_x + n[0, 1] * picture_y + n[0, 2]
             y = n[1, 0] * picture_x + n[1, 1] * picture_y + n[1, 2]
-            x, y = min(max(x, -2.0), columns + 1.0), min(max(y, -2.0), rows + 1.0)
+            if not (-0.5 <= x <= columns - 0.5 and -0.5 <= y <= rows - 0.5):
+                out[row, column] = 0
+                out_weight[row, column] = 0
+                continue
             left, top = int(np.floor(x)), int(np.floor(y))
             out_weight[row, column] = _linear(weight, left, top, x - left, y - top)
             _cubic(np.float32(x - left), across)

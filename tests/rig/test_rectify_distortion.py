@@ -94,6 +94,8 @@ def test_beyond_the_border_there_is_no_weight_and_no_light_below_zero() -> None:
     resample_view(view, np.full((6, 6), 200, np.uint8), shifted, np.zeros(5), np.eye(3), out, weight)
     assert weight[2].tolist() == [0, 0, 0, 100, 200, 200, 200, 200, 200, 100, 0, 0]
     assert out.min() == 0 and out.max() < 1
+    resample_view(np.ones_like(view), np.full((6, 6), 200, np.uint8), shifted, np.zeros(5), np.eye(3), out, weight)
+    assert out[2, :, 0].tolist() == [0] * 3 + [1] * 7 + [0] * 2  # black, not the border's colour drawn out
 
 
 def test_no_more_threads_than_compiled_code_may_use(monkeypatch: pytest.MonkeyPatch) -> None:
