@@ -65,7 +65,7 @@ class Seen:
     other: Tensor | None
     """``(1, 3, H, W)`` sharp image of the right eye, if there is one."""
     matched: Matched
-    """Descriptors of both."""
+    """Descriptors of both eyes and their sharpness; ``None`` where there is one eye alone."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,9 +73,11 @@ class Front:
     """What stands before the refinement."""
 
     clues: Tensor
+    """``(B, 15, H, W)``, see :func:`lfstereo.network.clues.clue_maps`."""
     offers: Tensor
+    """``(B, 3, H, W)`` disparities in px to choose from."""
     sharp: Tensor
-    """``(B, 3, H, W)`` left eye."""
+    """``(B, 3, H, W)`` all-in-focus image of the left eye, 0 to 1."""
 
 
 class BinocularNet(nn.Module):

@@ -98,8 +98,9 @@ def _maps(network: AnyNetwork, left: Tensor, right: Tensor) -> dict[str, Float32
     """Disparity maps in px, ``(H, W)``, by the part that made them."""
     if isinstance(network, BinocularNet):
         foci = torch.from_numpy(SLICE_DISPARITIES)
-        given = ((right, True), (right, False), (None, True))
-        found = [network(left, other, foci, use_focus)[0].disparity[0, 0].numpy() for other, use_focus in given]
+        seen = network.look(left, right)
+        fronts = [network.gather(seen, foci, *cues) for cues in ((True, True), (False, True), (True, False))]
+        found = [network.refine(front.clues, front.offers).disparity[0, 0].numpy() for front in fronts]
         return dict(zip(ABLATIONS, found, strict=True))
     pair = network(left, right)
     parts = {"focus": pair.focus, "guided": pair.guided, "stereo": pair.stereo.final, "fused": pair.fused}
