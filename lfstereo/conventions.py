@@ -24,7 +24,6 @@ Unknowns
 
 from __future__ import annotations
 
-LIGHT_FIELD_AXES = ("T", "S", "V", "U", "C")
 SLICES_DEFAULT = 16
 DISPARITY_RANGE_PX = 100.0
 """Largest disparity (px) of the working range that rectification aims at; the networks' label unit."""

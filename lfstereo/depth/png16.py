@@ -7,7 +7,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from lfstereo.arrays import Bool, Float32, UInt8, check_shape
+from lfstereo.arrays import Bool, Float32, check_shape
+from lfstereo.container.picture_size import decoded_picture
 from lfstereo.errors import InputError, ShapeError
 from lfstereo.outputs import atomic_file
 
@@ -73,10 +74,10 @@ def read_disparity_png(path: Path) -> tuple[Float32, Bool]:
         If the file cannot be read, is no picture, or is not 16-bit grey.
     """
     try:
-        coded: UInt8 = np.frombuffer(path.read_bytes(), np.uint8)
+        data = path.read_bytes()
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror}); give the path of a PNG file") from error
-    steps = cv2.imdecode(coded, cv2.IMREAD_UNCHANGED) if coded.size else None
+    steps = decoded_picture(data, cv2.IMREAD_UNCHANGED, str(path))
     if steps is None:
         raise InputError(f"{path}: not a readable picture, expected a 16-bit grey PNG; copy it again")
     if steps.dtype != np.uint16 or steps.ndim != 2:

@@ -15,6 +15,7 @@ import numpy.typing as npt
 import tifffile
 
 from lfstereo.arrays import Float32, Float64, Rgb
+from lfstereo.container.picture_size import PNG_START, is_picture
 from lfstereo.errors import ConfigError, ContainerError, ShapeError
 from lfstereo.focus.exif import FocusTags, focal_px_of, read_focus_tags
 from lfstereo.focus.sweep import FocusSweep, LensData
@@ -225,9 +226,9 @@ def _read_picture(path: Path) -> Rgb:
     import imageio.v3 as iio
 
     try:
-        with path.open("rb") as file:
-            head = file.read(_PNG_DEPTH_BYTE + 1)
-        deep_png = path.suffix.lower() == ".png" and head[_PNG_DEPTH_BYTE:] == bytes([_PNG_DEEP])
+        data = path.read_bytes()
+        is_picture(data, str(path))  # no decoder allocates what a head says before this
+        deep_png = data.startswith(PNG_START) and data[_PNG_DEPTH_BYTE : _PNG_DEPTH_BYTE + 1] == bytes([_PNG_DEEP])
         plugin: dict[str, Any] = {"plugin": "pillow", "rotate": True}
         if deep_png:  # which Pillow would bring to 8 bits
             plugin = {"plugin": "opencv", "flags": cv2.IMREAD_COLOR | cv2.IMREAD_ANYDEPTH}
@@ -236,6 +237,8 @@ def _read_picture(path: Path) -> Rgb:
         pixels = np.asarray(iio.imread(path, **plugin))
         if plugin == {"plugin": "tifffile"}:
             pixels = _turned(pixels, _tiff_orientation(path))
+    except ContainerError:
+        raise
     except Exception as error:  # every decoder has its own kinds
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise ContainerError(f"{path}: cannot be read as a picture ({reason}); export it again") from error

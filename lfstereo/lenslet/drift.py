@@ -35,8 +35,6 @@ class Drift:
     """RMS distance over the trusted part of the sensor between the grid and the lattice that the frame shows."""
     shift_px: tuple[float, float]
     """Mean (x, y) from the grid to the frame's lattice."""
-    scatter_px: float
-    """Robust RMS distance of single centres to that lattice: the scene's doing."""
     lenslets: int
     """Number of micro-images measured."""
 
@@ -66,7 +64,7 @@ def measure_drift(frame: Capture, grid: LensletGrid, options: GridOptions = Grid
     tiles = _tiles(frame, lattice.pitch, options.trusted_field)
     shading = options.white_shading_per_px if frame.metadata.is_white_image else options.photograph_shading_per_px
     moved = np.zeros(2)
-    fitted, index, scatter = lattice, np.zeros((0, 2)), 0.0
+    fitted, index = lattice, np.zeros((0, 2))
     for _ in range(_ROUNDS):
         around = Lattice(lattice.origin + moved, lattice.row, lattice.diagonal)
         template = mean_micro_image(
@@ -83,7 +81,7 @@ def measure_drift(frame: Capture, grid: LensletGrid, options: GridOptions = Grid
                 f"{frame.source}: found {len(index)} micro-images near the grid, expected at least {_LEAST_CENTRES}; "
                 "the grid is not this camera's, or the frame is dark"
             )
-        fitted, scatter = robust_affine(index, measured, weight)
+        fitted, _ = robust_affine(index, measured, weight)
         # Centres are measured to first order, so what all share is taken out before measuring again.
         shared = (fitted.origin + index.mean(0) @ fitted.matrix.T) - (around.origin + index.mean(0) @ around.matrix.T)
         moved = moved + shared
@@ -97,7 +95,6 @@ def measure_drift(frame: Capture, grid: LensletGrid, options: GridOptions = Grid
     return Drift(
         offset_px=float(np.sqrt((apart**2).sum(1).mean())),
         shift_px=(float(mean[0]), float(mean[1])),
-        scatter_px=scatter,
         lenslets=len(index),
     )
 

@@ -124,7 +124,6 @@ class _Motion:
     """Straight paths of corners through the views, fitted to all views added so far."""
 
     def __init__(self, centre: Float64) -> None:
-        self._place = centre
         self._sums = np.zeros((len(centre), 3, 3)) + np.diag([1e-3, 1e-3, 1e-3])
         self._moments = np.zeros((len(centre), 3, 2))
         self._moments[:, 0] = 1e-3 * centre

@@ -8,9 +8,6 @@ import numpy as np
 
 from lfstereo.arrays import Float64
 
-NONE = (0.0, 0.0, 0.0, 0.0, 0.0)
-"""No distortion: k1, k2, k3, b1, b2."""
-
 
 @dataclass(frozen=True, slots=True)
 class Distorted:

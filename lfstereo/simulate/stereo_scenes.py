@@ -19,6 +19,7 @@ import cv2
 import numpy as np
 
 from lfstereo.arrays import Bool, Float32, Rgb, UInt8, UInt16
+from lfstereo.container.picture_size import decoded_picture
 from lfstereo.depth.baselines import fill_from_background
 from lfstereo.depth.disparity import DisparityMap
 from lfstereo.depth.pfm import read_pfm
@@ -206,10 +207,10 @@ def _filled(disparity: Float32, known: Bool) -> Float32:
 
 def _decoded(path: Path) -> UInt8 | UInt16:
     try:
-        content = np.frombuffer(path.read_bytes(), np.uint8)
+        content = path.read_bytes()
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror}); give the path of a picture") from error
-    coded: UInt8 | UInt16 | None = cv2.imdecode(content, cv2.IMREAD_UNCHANGED) if content.size else None
+    coded: UInt8 | UInt16 | None = decoded_picture(content, cv2.IMREAD_UNCHANGED, str(path))
     if coded is None or coded.dtype not in (np.uint8, np.uint16):
         raise InputError(f"{path}: not a picture of 8 or 16 bits; give a PNG, PPM or JPEG file")
     return coded

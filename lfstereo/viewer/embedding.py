@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 
 from lfstereo.arrays import Bool, UInt8, UInt16
+from lfstereo.container.picture_size import decoded_picture
 from lfstereo.depth.colormap import DisparityScale, colour_disparity
 from lfstereo.errors import ContainerError
 
@@ -41,10 +42,10 @@ def picture_from_uri(uri: str) -> UInt8:
         If it holds no picture.
     """
     try:
-        coded = np.frombuffer(base64.b64decode(uri.removeprefix(_JPEG_START), validate=True), np.uint8)
+        coded = base64.b64decode(uri.removeprefix(_JPEG_START), validate=True)
     except ValueError:
-        coded = np.empty(0, np.uint8)
-    picture = cv2.imdecode(coded, cv2.IMREAD_COLOR) if coded.size else None
+        coded = b""
+    picture = decoded_picture(coded, cv2.IMREAD_COLOR, "page")
     if picture is None:
         raise ContainerError(f"page: found '{uri[:32]}…', expected a JPEG picture; run the pair again")
     turned: UInt8 = np.ascontiguousarray(picture[..., ::-1])

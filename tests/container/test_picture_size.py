@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import base64
 import struct
 import zlib
+from collections.abc import Callable
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -11,7 +14,12 @@ import pytest
 
 from lfstereo.container.expansion import ALWAYS_ALLOWED_BYTES, LARGEST_RATIO, check_expansion
 from lfstereo.container.picture_size import decoded_picture, is_picture
+from lfstereo.depth.png16 import read_disparity_png
 from lfstereo.errors import ContainerError
+from lfstereo.focus.importers import read_sweep
+from lfstereo.simulate.stereo_scenes import read_picture
+from lfstereo.training.atlas import read_atlas
+from lfstereo.viewer.embedding import picture_from_uri
 
 
 def encoded(suffix: str) -> bytes:
@@ -40,6 +48,22 @@ def test_known_pictures_are_decoded(suffix: str) -> None:
 def test_bombs_are_refused_before_they_are_decoded(data: bytes) -> None:
     with pytest.raises(ContainerError, match=r"a: says that its \d+ bytes hold \d+, expected at most 268435456"):
         decoded_picture(data, cv2.IMREAD_COLOR, "a")
+
+
+def test_every_reader_of_pictures_refuses_them(tmp_path: Path) -> None:
+    bomb = tmp_path / "bomb.png"
+    bomb.write_bytes(png_of(60_000, 60_000))
+    (tmp_path / "other.png").write_bytes(bomb.read_bytes())
+    readers: list[Callable[[], object]] = [
+        lambda: read_disparity_png(bomb),
+        lambda: read_sweep(tmp_path),
+        lambda: read_atlas(str(tmp_path)),
+        lambda: read_picture(bomb),
+        lambda: picture_from_uri("data:image/jpeg;base64," + base64.b64encode(bomb.read_bytes()).decode()),
+    ]
+    for read in readers:
+        with pytest.raises(ContainerError, match="made to fill the memory"):
+            read()
 
 
 def test_large_tiff_head(tmp_path: object) -> None:

@@ -121,6 +121,8 @@ def test_missing_weight_in_the_file(copied: Path) -> None:
         ("licence =", "license =", "'licence' is missing"),
         ("version = 1", "version = 1\ncolour = 2", "'colour' is unknown"),
         ("edof_width = 4", "edof_width = 'x'", "does not fit"),
+        ("edof_width = 4", "edof_width = 1000000000", "edof_width = 1000000000, expected 1 to 256"),
+        ("edof_width = 4", "edof_width = 0", "edof_width = 0, expected 1 to 256"),
         ("version = 1", "version = = 1", "not valid TOML"),
     ],
 )
