@@ -32,7 +32,8 @@ def take_picture(
     if side == "right":
         scene = scene.seen_from(rig.stereo.right_from_left, np.asarray(rig.stereo.translation_m))
     metadata = picture_metadata(camera, side)
-    light = trace_light(camera, scene, picture_filters(metadata), options.samples, progress)
+    filters = options.exposure * picture_filters(metadata)
+    light = trace_light(camera, scene, filters, options.samples, progress)
     return Capture(expose(light, metadata, options, frame), metadata, f"simulated {side} picture")
 
 

@@ -25,6 +25,7 @@ class SimulateOptions:
     near_m: float = option(0.60, "near end of the working range", "m")
     far_m: float = option(1.20, "far end of the working range, where the background is", "m")
     samples: int = option(4, "rays per sensor pixel")
+    exposure: float = option(1.0, "light of the pictures; at 1, white is just below the white level")
     noise: bool = option(True, "photon noise, read noise and hot pixels")
     full_well_e: float = option(5000.0, "electrons that a pixel holds at the white level", "e-")
     read_noise_dn: float = option(1.5, "standard deviation of the read noise", "DN")
@@ -34,8 +35,8 @@ class SimulateOptions:
     board_square_m: float | None = option(None, "side of one square of the board", "m")
 
     def __post_init__(self) -> None:
-        positive = ("focal_length_m", "f_number", "focus_m", "baseline_m", "near_m", "samples", "full_well_e")
-        for name in positive:
+        optics = ("focal_length_m", "f_number", "focus_m", "baseline_m", "near_m")
+        for name in (*optics, "samples", "exposure", "full_well_e"):
             _check(name, getattr(self, name), getattr(self, name) > 0, "a positive number")
         for name in ("read_noise_dn", "hot_pixels", "boards", "seed"):
             _check(name, getattr(self, name), getattr(self, name) >= 0, "zero or more")

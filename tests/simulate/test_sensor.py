@@ -75,6 +75,16 @@ def test_picture_divided_by_its_white_image_is_flat_grey(rig: SimulatedRig) -> N
             np.testing.assert_allclose(site, grey, rtol=0.02)
 
 
+def test_exposure_scales_pictures_and_not_white_images(rig: SimulatedRig) -> None:
+    small = replace(rig, left=replace(rig.left, sensor_px=(160, 150), principal_px=(80.0, 75.0)))
+    plain, dark = (SimulateOptions(sensor="small", noise=False, samples=1, exposure=e) for e in (1.0, 0.25))
+    full, quarter = (take_picture(card(0.9, 1.0), small, "left", o).mosaic.astype(float) - 64 for o in (plain, dark))
+    assert full.max() > 100
+    np.testing.assert_allclose(quarter, full / 4, atol=0.5 + 0.125)  # both rounded to whole DN
+    whites = [take_white_image(small, "left", o).mosaic for o in (plain, dark)]
+    np.testing.assert_array_equal(*whites)
+
+
 @pytest.mark.parametrize("level", [0.02, 0.2, 0.8])
 def test_noise_variance_follows_the_mean(rig: SimulatedRig, level: float) -> None:
     options = SimulateOptions(full_well_e=5000, read_noise_dn=1.5, hot_pixels=0)
