@@ -1,8 +1,8 @@
 """The binocular focus volume: both cues on one disparity axis, for any number of slices.
 
 1. Every slice is scored for focus by the same weights; the scores weigh the slices into an all-in-focus image per eye.
-2. Each pixel of both sharp images gets a descriptor; the products of the two eyes' descriptors at every disparity say
-   how well they match.
+2. The right image is brought to the exposure of the left one. Each pixel of both gets a descriptor, learnt and census
+   together; the products of the two eyes' descriptors at every disparity say how well they match.
 3. What a disparity lacks in match and what it lacks in focus are added in one volume over (y, x, d), in which
    slice k stands at its own disparity, and aggregated along eight paths.
 4. A U-Net with the sharp image at hand decides what to trust, fills what only one eye sees, corrects, and tells
@@ -20,15 +20,19 @@ from typing import Literal
 
 import numpy as np
 import torch
+import torch.nn.functional as F
 from torch import Tensor, nn
 
 from lfstereo.arrays import Float32
+from lfstereo.network.census import census_vectors
 from lfstereo.network.clues import clue_maps, focus_disparity
 from lfstereo.network.descriptor_net import DescriptorNet
 from lfstereo.network.penalties import Penalties
+from lfstereo.network.photometry import fitted_light
 from lfstereo.network.refine_net import Refined, RefineNet
 from lfstereo.network.semiglobal_torch import Matched, aggregate, read_out, volume_energy
 from lfstereo.network.slice_scores import Focused, SliceScores
+from lfstereo.network.volume import warp_right
 from lfstereo.options import option
 
 MULTIPLE = 32
@@ -44,6 +48,9 @@ READINGS = 6
 _BEYOND_PX = 4
 """Disparities searched beyond the nearest slice."""
 _FEWEST_BINS = 16
+_EXPOSURE_SHRINK = 4
+"""Reduction at which the pictures are matched to compare their exposure."""
+_AGREE_BINS = 1.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,9 +70,9 @@ class Seen:
     focused: Focused
     """Left eye."""
     other: Tensor | None
-    """``(1, 3, H, W)`` sharp image of the right eye, if there is one."""
+    """``(1, 3, H, W)`` sharp image of the right eye in the left one's exposure, if there is one."""
     matched: Matched
-    """Descriptors of both eyes and their sharpness; ``None`` where there is one eye alone."""
+    """Descriptors of both eyes, the left ones weighted; ``None`` where there is one eye alone."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,17 +118,33 @@ class BinocularNet(nn.Module):
     @torch.no_grad()
     def front(self, left: Tensor, right: Tensor | None, foci: Tensor, use_focus: bool = True) -> Front:
         """Score, match, aggregate; parameters as for :meth:`forward`."""
-        return self.gather(self.look(left, right), foci, use_focus)
+        return self.gather(self.look(left, right, foci), foci, use_focus)
 
     @torch.no_grad()
-    def look(self, left: Tensor, right: Tensor | None) -> Seen:
-        """Score the slices, make the sharp images and describe their pixels."""
+    def look(self, left: Tensor, right: Tensor | None, foci: Tensor) -> Seen:
+        """Score the slices, make the sharp images alike in exposure and describe their pixels."""
         focused = self.slices(left)
         if right is None:
             return Seen(focused, None, None)
-        other = self.slices(right).sharp
-        described, sharpness = self.descriptors(torch.cat((focused.sharp, other)))
-        return Seen(focused, other, (described[0], described[1], sharpness[0, 0]))
+        other = self._in_left_light(focused.sharp, self.slices(right).sharp, foci)
+        both = torch.cat((focused.sharp, other))
+        learnt, sharpness = self.descriptors(both)
+        census = census_vectors(both)
+        first = torch.cat((sharpness[0] * learnt[0], self.penalties.census * census[0]))
+        return Seen(focused, other, (first, torch.cat((learnt[1], census[1]))))
+
+    def _in_left_light(self, sharp: Tensor, other: Tensor, foci: Tensor) -> Tensor:
+        """Return the right picture in the exposure of the left one, as census matches of small pictures tell it."""
+        small, small_other = (F.avg_pool2d(picture, _EXPOSURE_SHRINK) for picture in (sharp, other))
+        census = census_vectors(torch.cat((small, small_other)))
+        bins = max(_bins(foci) // _EXPOSURE_SHRINK + 1, _FEWEST_BINS)
+        read = _readings(
+            (self.penalties.census * census[0], census[1]), None, foci, bins, small[0].mean(0), self.penalties
+        )
+        warped = warp_right(small_other, read[None, :1])
+        counted = (read[4] >= 0) & (read[4] < _AGREE_BINS)
+        gain, offset = fitted_light(small[0].flatten(1), warped[0].flatten(1), counted.flatten())
+        return (gain.view(1, 3, 1, 1) * other + offset.view(1, 3, 1, 1)).clamp(0, 1)
 
     @torch.no_grad()
     def gather(self, seen: Seen, foci: Tensor, use_focus: bool = True, use_match: bool = True) -> Front:
@@ -129,13 +152,23 @@ class BinocularNet(nn.Module):
         sharp = seen.focused.sharp
         other, matched = (seen.other, seen.matched) if use_match else (None, None)
         use_focus = (use_focus or matched is None) and seen.focused.scores.shape[1] > 1
-        bins = max(int(float(foci.max())) + 1 + _BEYOND_PX, _FEWEST_BINS)
         scores = seen.focused.scores[0] if use_focus else None
-        read = _compiled_readings if sharp.device.type == "cpu" and find_spec("numba") else _torch_readings
-        readings = read(matched, scores, foci, bins, sharp[0].mean(0), self.penalties)[None]
+        readings = _readings(matched, scores, foci, _bins(foci), sharp[0].mean(0), self.penalties)[None]
         focus = focus_disparity(seen.focused.scores, foci) if use_focus else None
         clues, offers = clue_maps(sharp, readings, focus, other)
         return Front(clues, offers, sharp)
+
+
+def _bins(foci: Tensor) -> int:
+    return max(int(float(foci.max())) + 1 + _BEYOND_PX, _FEWEST_BINS)
+
+
+def _readings(
+    matched: Matched, scores: Tensor | None, foci: Tensor, bins: int, guide: Tensor, weights: Penalties
+) -> Tensor:
+    """Aggregate the cues over disparities 0 to ``bins - 1`` and read out ``(6, H, W)``."""
+    compiled = guide.device.type == "cpu" and find_spec("numba") is not None
+    return (_compiled_readings if compiled else _torch_readings)(matched, scores, foci, bins, guide, weights)
 
 
 def _torch_readings(
@@ -154,8 +187,7 @@ def _compiled_readings(
     energy = np.zeros((height, width, bins), np.float32)
     if matched is not None:
         left, right = _pixels(matched[0]), np.ascontiguousarray(_pixels(matched[1])[:, ::-1])
-        sharpness = np.ascontiguousarray(matched[2].numpy())
-        semiglobal.match_energy(left, right, sharpness, weights.match_ceiling, weights.unseen, energy)
+        semiglobal.match_energy(left, right, weights.match_ceiling, weights.unseen, energy)
     if scores is not None:
         places = foci.numpy().astype(np.float32)
         semiglobal.add_focus_energy(_pixels(scores), places, weights.focus_weight, weights.focus_ceiling, energy)

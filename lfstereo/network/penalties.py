@@ -13,6 +13,8 @@ class Penalties:
     """Most that the match of the eyes adds."""
     unseen: float = 4.0
     """What it adds where the right picture does not reach."""
+    census: float = 24.0
+    """Factor of the census' product, -1 to 1, in the match; that of the learnt descriptors is their sharpness."""
     focus_weight: float = 1.0
     focus_ceiling: float = 4.0
     """Most that a slice's score lacks, before the weight."""

@@ -20,17 +20,13 @@ _FAR = np.float32(1e9)
 
 
 @numba.njit(cache=True, nogil=True, fastmath=True, parallel=True)  # type: ignore[untyped-decorator]
-def match_energy(
-    left: Float32, right: Float32, sharpness: Float32, ceiling: float, unseen: float, out: Float32
-) -> None:
+def match_energy(left: Float32, right: Float32, ceiling: float, unseen: float, out: Float32) -> None:
     """Fill ``(H, W, D)`` with what each disparity's match lacks to the best match of the pixel.
 
     Parameters
     ----------
     left, right
-        ``(H, W, C)`` unit descriptors; ``right`` is given mirrored in x, so that disparities follow each other.
-    sharpness
-        ``(H, W)``.
+        ``(H, W, C)`` descriptors; ``right`` is given mirrored in x, so that disparities follow each other.
     ceiling, unseen
         As in :class:`lfstereo.network.penalties.Penalties`.
     out
@@ -56,9 +52,8 @@ def match_energy(
             best = scores[0]
             for d in range(seen):
                 best = max(best, scores[d])
-            scale = sharpness[y, x]
             for d in range(seen):
-                scores[d] = min(scale * (best - scores[d]), ceiling)
+                scores[d] = min(best - scores[d], ceiling)
             for d in range(seen, bins):
                 scores[d] = unseen
 

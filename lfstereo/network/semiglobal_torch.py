@@ -14,8 +14,8 @@ from lfstereo.network.penalties import Penalties
 _FAR = 1e9
 
 
-Matched = tuple[Tensor, Tensor, Tensor] | None
-"""Left and right descriptors ``(C, H, W)`` and the sharpness ``(H, W)``; ``None`` without the stereo cue."""
+Matched = tuple[Tensor, Tensor] | None
+"""Left and right descriptors ``(C, H, W)``, whose product is the match; ``None`` without the stereo cue."""
 
 
 def volume_energy(
@@ -30,7 +30,7 @@ def volume_energy(
     Parameters
     ----------
     descriptors
-        Left and right ``(C, H, W)`` and the sharpness ``(H, W)``; ``None`` without the stereo cue.
+        Left and right ``(C, H, W)``; ``None`` without the stereo cue.
     scores
         ``(K, H / 4, W / 4)`` of the slices; ``None`` without the focus cue.
     foci
@@ -50,12 +50,12 @@ def volume_energy(
     return total
 
 
-def _match_energy(left: Tensor, right: Tensor, sharpness: Tensor, bins: int, weights: Penalties) -> Tensor:
+def _match_energy(left: Tensor, right: Tensor, bins: int, weights: Penalties) -> Tensor:
     _, height, width = left.shape
     products = left.new_full((height, width, bins), -_FAR)
     for d in range(min(bins, width)):
         products[:, d:, d] = (left[:, :, d:] * right[:, :, : width - d]).sum(0)
-    lacking = sharpness[..., None] * (products.amax(2, keepdim=True) - products)
+    lacking = products.amax(2, keepdim=True) - products
     return torch.where(products > -_FAR, lacking.clamp(max=weights.match_ceiling), weights.unseen)
 
 

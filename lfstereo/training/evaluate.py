@@ -98,7 +98,7 @@ def _maps(network: AnyNetwork, left: Tensor, right: Tensor) -> dict[str, Float32
     """Disparity maps in px, ``(H, W)``, by the part that made them."""
     if isinstance(network, BinocularNet):
         foci = torch.from_numpy(SLICE_DISPARITIES)
-        seen = network.look(left, right)
+        seen = network.look(left, right, foci)
         fronts = [network.gather(seen, foci, *cues) for cues in ((True, True), (False, True), (True, False))]
         found = [network.refine(front.clues, front.offers).disparity[0, 0].numpy() for front in fronts]
         return dict(zip(ABLATIONS, found, strict=True))

@@ -78,7 +78,7 @@ def fill_fronts(folder: Path, recipe: Recipe, network: BinocularNet, progress: P
             continue
         stacks = torch.from_numpy(pool.stacks[index].astype(np.float32) / 255).permute(0, 1, 4, 2, 3)
         with torch.inference_mode():
-            seen = network.look(stacks[:1], stacks[1:])
+            seen = network.look(stacks[:1], stacks[1:], _FOCI)
             for number, cue in enumerate(CUES):
                 front = network.gather(seen, _FOCI, cue != "stereo", cue != "focus")
                 maps[index, number] = torch.cat((front.clues, front.offers), dim=1)[0].numpy()

@@ -10,6 +10,7 @@ from lfstereo.focus.stack import FocalStack
 from lfstereo.network.binocular_net import BinocularArchitecture, BinocularNet
 from lfstereo.network.blocks import channels_last, fold_batch_norms
 from lfstereo.network.card import ModelCard, Training
+from lfstereo.network.census import census_vectors
 from lfstereo.network.clues import focus_disparity
 from lfstereo.network.descriptor_net import DescriptorNet, row_logits
 from lfstereo.network.estimate import (
@@ -19,6 +20,7 @@ from lfstereo.network.estimate import (
     estimate_from_pictures,
     slice_limits,
 )
+from lfstereo.network.photometry import fitted_light
 from lfstereo.network.refine_net import CLUES, OFFERS, RefineNet, take_over
 from lfstereo.network.slice_scores import SliceScores
 from lfstereo.network.weights import load_model, save_model
@@ -60,6 +62,49 @@ def test_untrained_descriptors_find_a_planted_disparity(network: Network) -> Non
     front = network.module.front(left, right, torch.tensor([20.0]))  # type: ignore[union-attr,operator]
     best = front.offers[0, 0, :40, SHIFT:70]
     assert float((best - SHIFT).abs().median()) < 0.1
+
+
+def test_census_says_what_outshines_what() -> None:
+    picture = torch.rand(1, 3, 12, 16, generator=torch.Generator().manual_seed(0))
+    vectors = census_vectors(picture)
+    assert tuple(vectors.shape) == (1, 24, 12, 16)
+    assert float((vectors * vectors).sum(1).median()) > 0.95  # differences far above the noise: nearly of length 1
+    darker = census_vectors(0.5 * picture + 0.1)
+    assert float((vectors * darker).sum(1).median()) > 0.9
+    assert float((vectors * census_vectors(1 - picture)).sum(1).max()) < 0
+    assert not census_vectors(torch.full((1, 3, 8, 8), 0.3)).any()
+
+
+def test_exposure_of_one_picture_is_found_from_the_other() -> None:
+    draw = torch.Generator().manual_seed(0)
+    given = torch.rand(3, 4000, generator=draw)
+    gains, offsets = torch.tensor([0.7, 1.0, 1.6]), torch.tensor([0.1, 0.0, -0.2])
+    wanted = gains[:, None] * given + offsets[:, None]
+    wanted[:, :800] = torch.rand(3, 800, generator=draw)  # wrong matches
+    counted = torch.arange(4000) < 3500
+    gain, offset = fitted_light(wanted, given, counted)
+    assert gain.tolist() == pytest.approx(gains.tolist(), abs=0.01)
+    assert offset.tolist() == pytest.approx(offsets.tolist(), abs=0.01)
+
+
+@pytest.mark.parametrize("share", [0.01, 1.0])
+def test_exposure_stays_where_nothing_tells_it(share: float) -> None:
+    plain = torch.full((3, 1000), 0.4)
+    wanted = plain if share == 1.0 else 9 * torch.rand(3, 1000, generator=torch.Generator().manual_seed(0))
+    gain, offset = fitted_light(wanted, plain, torch.arange(1000) < 1000 * share)
+    assert gain.tolist() == [1.0] * 3 and offset.tolist() == pytest.approx([0.0] * 3, abs=1e-6)
+
+
+def test_another_exposure_of_the_right_eye_changes_nothing(network: Network) -> None:
+    wide = cv2.GaussianBlur(texture(np.random.default_rng(5), 64, 128 + SHIFT), (0, 0), 1.5)
+    left, right = (
+        torch.from_numpy(np.ascontiguousarray(p)).permute(2, 0, 1)[None, None] for p in (wide[:, :128], wide[:, SHIFT:])
+    )
+    foci = torch.tensor([20.0])
+    plain = network.module.front(left, right, foci)  # type: ignore[union-attr,operator]
+    darker = network.module.front(left, 0.6 * right + 0.05, foci)  # type: ignore[union-attr,operator]
+    assert float((darker.offers[:, 0] - plain.offers[:, 0]).abs().median()) < 0.05
+    assert float((darker.clues - plain.clues).abs().mean()) < 0.01
 
 
 def test_row_logits_are_products_at_each_shift() -> None:

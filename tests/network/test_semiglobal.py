@@ -20,13 +20,12 @@ def unit(rng: np.random.Generator, *shape: int) -> np.ndarray:
 
 def test_match_energy_is_what_a_match_lacks_to_the_best() -> None:
     rng = np.random.default_rng(0)
-    left, right = unit(rng, 2, 9, 5), unit(rng, 2, 9, 5)
-    sharpness = rng.uniform(1, 9, (2, 9)).astype(np.float32)
+    left, right = 5 * unit(rng, 2, 9, 5), unit(rng, 2, 9, 5)
     energy = np.empty((2, 9, 4), np.float32)
-    match_energy(left, np.ascontiguousarray(right[:, ::-1]), sharpness, 3.0, 1.5, energy)
+    match_energy(left, np.ascontiguousarray(right[:, ::-1]), 3.0, 1.5, energy)
     for y, x in np.ndindex(2, 9):
         scores = [float(left[y, x] @ right[y, x - d]) for d in range(min(4, x + 1))]
-        wanted = [min(sharpness[y, x] * (max(scores) - s), 3.0) for s in scores] + [1.5] * (4 - len(scores))
+        wanted = [min(max(scores) - s, 3.0) for s in scores] + [1.5] * (4 - len(scores))
         assert energy[y, x] == pytest.approx(wanted, abs=ULPS)
 
 
@@ -92,19 +91,18 @@ def test_read_out_of_a_known_volume() -> None:
 def test_torch_tells_the_same_as_the_compiled_loops() -> None:
     rng = np.random.default_rng(2)
     weights = Penalties(match_ceiling=4.0, unseen=1.0, focus_ceiling=2.0, small=0.5, large=3.0)
-    left, right = unit(rng, 12, 20, 5), unit(rng, 12, 20, 5)
-    sharpness = rng.uniform(1, 9, (12, 20)).astype(np.float32)
+    left, right = 5 * unit(rng, 12, 20, 5), unit(rng, 12, 20, 5)
     scores = rng.standard_normal((3, 5, 4), dtype=np.float32)
     foci, guide = np.float32([11.0, 7.0, 2.5, 1.0]), rng.random((12, 20), dtype=np.float32)
     energy = np.empty((12, 20, 14), np.float32)
-    match_energy(left, np.ascontiguousarray(right[:, ::-1]), sharpness, 4.0, 1.0, energy)
+    match_energy(left, np.ascontiguousarray(right[:, ::-1]), 4.0, 1.0, energy)
     add_focus_energy(scores, foci, 1.0, 2.0, energy)
     sums, readings = np.empty((2, *energy.shape), np.float32), np.empty((READINGS, 12, 20), np.float32)
     aggregate(energy, guide, 0.5, 3.0, weights.edge, sums)
     read_out(sums[0], energy, readings)
-    described = (*(torch.from_numpy(a).permute(2, 0, 1) for a in (left, right)), torch.from_numpy(sharpness))
+    first, second = (torch.from_numpy(a).permute(2, 0, 1) for a in (left, right))
     same = semiglobal_torch.volume_energy(
-        described, torch.from_numpy(scores).permute(2, 0, 1), torch.from_numpy(foci), 14, weights
+        (first, second), torch.from_numpy(scores).permute(2, 0, 1), torch.from_numpy(foci), 14, weights
     )
     assert np.allclose(same.numpy(), energy, atol=ULPS)
     total = semiglobal_torch.aggregate(same, torch.from_numpy(guide), weights)
