@@ -1,9 +1,9 @@
 """Random simulated rigs, from raw captures to metres: how far from the truth the depth is, and which rigs fail.
 
-Run ``python benchmarks/bench_end_to_end.py FOLDER [--rigs 20] [--boards 7]``. Each rig differs in focal length,
+Run ``python benchmarks/bench_end_to_end.py FOLDER [--rigs 20] [--boards 5]``. Each rig differs in focal length,
 aperture (and with it vignetting), focus, distortion, baseline, working range, exposure, noise and scene. Its board
 shots are photographed and calibrated, its scene is photographed and run, all through the commands that a user types
-and at full sensor size; the depth of every pixel is compared with the scene's. Five minutes of two cores a rig. What
+and at full sensor size; the depth of every pixel is compared with the scene's. Seven minutes of one core a rig. What
 was measured is kept in ``FOLDER/rigs.jsonl``; started again, it goes on where it was, and prints the table of all.
 """
 
@@ -150,7 +150,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("folder", type=Path)
     parser.add_argument("--rigs", type=int, default=20)
-    parser.add_argument("--boards", type=int, default=7, help="board shots of each rig")
+    parser.add_argument("--boards", type=int, default=5, help="board shots of each rig")
     parser.add_argument("--keep", action="store_true", help="keep the captures, 1 GB a rig")
     arguments = parser.parse_args()
     arguments.folder.mkdir(parents=True, exist_ok=True)

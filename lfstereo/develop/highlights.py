@@ -89,6 +89,8 @@ def _lifted(
         for a in range(left, right):
             if raw[b, a] >= start[b & 1, a & 1] + ramp[b & 1, a & 1]:
                 first = min(first, mosaic[b, a] / clips_at[b & 1, a & 1])
+    if first <= 0:  # a stuck pixel, filled in from dark ones beside it
+        return float(mosaic[y, x])
     total, count = np.zeros(3), np.zeros(3)
     for b in range(top, bottom):
         for a in range(left, right):

@@ -240,6 +240,16 @@ def test_unclipped_values_are_not_lifted(capture: Capture) -> None:
     assert np.array_equal(mosaic, before)
 
 
+def test_stuck_pixels_in_the_dark_stay_dark(capture: Capture) -> None:
+    """A site that reads white alone and was filled in from its neighbours, who saw nothing."""
+    values = np.zeros(SHAPE)
+    values[20, 30] = 1.0
+    photo = with_values(capture, values)
+    mosaic = np.zeros(SHAPE, np.float32)
+    lift_clipped(mosaic, photo.mosaic, photo.metadata, (1.4, 1.0, 1.0, 1.2))
+    assert not mosaic.any()
+
+
 def test_levels(capture: Capture) -> None:
     photo = with_values(capture, np.array([[0.0, 1.0], [0.5, 0.25]]).repeat(3, 0).repeat(3, 1))
     assert normalise_levels(photo).min() == 0
