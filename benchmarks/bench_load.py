@@ -105,12 +105,12 @@ def _resident_gib(pid: int) -> float:
 def report(folder: Path, damages: dict[str, str], count: int, seen: list[tuple[float, float]]) -> None:
     """Print what became of every pair."""
     lines = [json.loads(line) for line in (folder / "out" / "record.jsonl").read_text("utf-8").splitlines()]
-    states = {line["name"]: line for line in lines if "name" in line}
+    states = {line["pair"]: line["state"] for line in lines}
     whole = {place.name for place in (folder / "out").iterdir() if (place / "run.toml").is_file()}
     good = {f"scene{number:03d}" for number in range(count)} - set(damages)
     spoilt = set(damages) & whole
     print(f"{len(good & whole)} of {len(good)} undamaged pairs converted; of {len(damages)} damaged ones {len(spoilt)}")
-    print(f"states in the record: {dict(Counter(str(line.get('state')) for line in states.values()))}")
+    print(f"states in the record: {dict(Counter(states.values()))}")
     quarters = np.array_split([gib for _, gib in seen], 4)
     largest = ", ".join(f"{part.max():.2f}" for part in quarters if len(part))
     print(f"largest resident memory in each quarter of the time, GiB: {largest}")
