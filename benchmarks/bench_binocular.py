@@ -3,7 +3,7 @@
 Run: ``python benchmarks/bench_binocular.py [--model NAME] [SCENES ...]``. ``SCENES`` are Middlebury folders, as for
 ``lfstereo evaluate``: they are photographed by the virtual camera, and the errors with both cues are set against those
 with either taken away, also on plain surfaces. With ``LFSTEREO_DATA`` it also reads ``lf/hci_antinous`` and
-``focal/corentincou_gen`` (one stack alone; CONTRIBUTING.md tells where they come from). Rendered light fields of seeds
+``focal/corentincou_gen`` (one stack alone; tests/DATA.md tells where they come from). Rendered light fields of seeds
 that training never saw are always there: 8 to 64 slices of the same views.
 """
 

@@ -1,7 +1,7 @@
 """Error and time of every classical depth from focus on stacks whose slice in focus is known.
 
 Run: ``python benchmarks/bench_depth_from_focus.py``. With ``LFSTEREO_DATA`` naming a folder that holds
-``focal/corentincou_gen`` (CONTRIBUTING.md tells where it comes from) it first reads those: 41 frames of 400 x 400 px.
+``focal/corentincou_gen`` (tests/DATA.md tells where it comes from) it first reads those: 41 frames of 400 x 400 px.
 All methods are timed in the same run, so their ratios hold on a busy machine too.
 """
 

@@ -1,6 +1,6 @@
 """Lenslet grids of real cameras against published centres; what is left is drawn.
 
-Run ``python benchmarks/bench_real_grid.py FOLDER -o OUT/`` with the folder ``tao_f01`` of CONTRIBUTING.md's table.
+Run ``python benchmarks/bench_real_grid.py FOLDER -o OUT/`` with the folder ``tao_f01`` of tests/DATA.md.
 
 The Illum's list (``illum_cords.mat``) mixes measured centres with others that lie on a computed lattice; the measured
 ones are fitted alone. The F01's (``image_cords.mat``) are rounded to whole px, so that even the true grid would be
