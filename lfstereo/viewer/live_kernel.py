@@ -12,7 +12,9 @@ import numpy as np
 from lfstereo.arrays import Float32, UInt8
 from lfstereo.focus.shift_kernels import compiled
 
-TILE_ROWS, TILE_COLUMNS = 8, 64
+TILE_ROWS, FEWEST_COLUMNS = 8, 64
+LARGEST_CHANGE = 0.06
+"""Of the slope over the width of a tile; a plane that is not tilted sideways has tiles as wide as the picture."""
 
 
 @compiled()
@@ -55,12 +57,15 @@ def refocus_codes(
         To be filled.
     """
     rows, columns = picture.shape[:2]
+    tile_columns = columns
+    if abs(plane[1]) * columns > LARGEST_CHANGE:
+        tile_columns = max(FEWEST_COLUMNS, int(LARGEST_CHANGE / abs(plane[1])))
     for band in numba.prange((rows + TILE_ROWS - 1) // TILE_ROWS):
         top = band * TILE_ROWS
         tall = min(TILE_ROWS, rows - top)
-        sums = np.empty((TILE_ROWS + 1, TILE_COLUMNS * 3), np.float32)
-        for left in range(0, columns, TILE_COLUMNS):
-            wide = min(TILE_COLUMNS, columns - left)
+        sums = np.empty((TILE_ROWS + 1, tile_columns * 3), np.float32)
+        for left in range(0, columns, tile_columns):
+            wide = min(tile_columns, columns - left)
             slope = plane[0] + plane[1] * (left + 0.5 * (wide - 1)) + plane[2] * (top + 0.5 * (tall - 1))
             tile = picture[top : top + tall, left : left + wide]
             tile[:] = 0
