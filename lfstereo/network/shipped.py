@@ -9,7 +9,7 @@ from lfstereo.errors import AssetError
 
 CARD = "card.toml"
 WEIGHTS = "weights.safetensors"
-DEFAULT_MODEL = "binocular-v1"
+DEFAULT_MODEL = "binocular-v2"
 """The model used where none is named."""
 
 

@@ -271,7 +271,7 @@ def safetensors(data: bytes) -> None:
 
 OPTIONS_TOML = b"""[run]
 slices = 16
-model = "binocular-v1"
+model = "binocular-v2"
 device = "auto"
 any_zoom = false
 [batch]
