@@ -105,8 +105,10 @@ def lens_of(camera: PinholeCamera, where: str) -> Lens:
     x, y = _places(camera.size_px)
     places = np.stack([x, y], axis=1)[:, None]
     stop = (cv2.TERM_CRITERIA_COUNT + cv2.TERM_CRITERIA_EPS, 200, 1e-13)
-    coefficients = np.asarray(camera.coefficients)
-    ideal = np.asarray(cv2.undistortPoints(places, camera.matrix, coefficients, criteria=stop), np.float64)[:, 0].T
+    seen = places, camera.matrix, np.asarray(camera.coefficients), None, None, None
+    of_opencv_4 = getattr(cv2, "undistortPointsIter", None)
+    undistorted = of_opencv_4(*seen[:5], stop) if of_opencv_4 else cv2.undistortPoints(*seen, criteria=stop)
+    ideal = np.asarray(undistorted, np.float64)[:, 0].T
     found, misfit = _fitted(_displaced_radial, start, np.ones(9, np.bool_), ideal, np.stack([x, y]))
     _check_misfit(where, misfit, "calibrate without tangential distortion, or photograph the target with lfstereo")
     return Lens((found[0], found[1]), (found[2], found[3]), (found[4], found[5], found[6], found[7], found[8]))
