@@ -13,7 +13,7 @@ from lfstereo.arrays import Float32, UInt8
 from lfstereo.focus.shift_kernels import compiled
 
 TILE_ROWS, FEWEST_COLUMNS = 8, 64
-LARGEST_CHANGE = 0.06
+LARGEST_CHANGE = 0.1
 """Of the slope over the width of a tile; a plane that is not tilted sideways has tiles as wide as the picture."""
 
 
