@@ -11,6 +11,7 @@ from __future__ import annotations
 import argparse
 import statistics
 import time
+from collections.abc import Callable
 
 import numpy as np
 import torch
@@ -43,9 +44,8 @@ def peak_gmac_s(device: str) -> float:
     return SIDE**3 / 1e9 / min(seconds_of(lambda: torch.mm(a, b), device) for _ in range(5))
 
 
-def seconds_of(work: object, device: str) -> float:
+def seconds_of(work: Callable[[], object], device: str) -> float:
     """Return the wall time of one call."""
-    assert callable(work)
     started = time.perf_counter()
     work()
     if device == "cuda":

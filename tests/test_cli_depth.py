@@ -108,7 +108,7 @@ def test_one_sweep_by_the_network(one: Path, tmp_path: Path) -> None:
     assert main(["depth", str(one / "sweep"), "--judge", "network", "--device", "cpu", "-o", str(folders[0])]) == 0
     assert main(["depth", str(one / "sweep"), "-o", str(folders[1])]) == 0
     (by_network, sure), (by_method, valid) = (read_pfm(folder / "slice_index.pfm") for folder in folders)
-    assert (sure & valid).mean() > 0.1  # with one stack alone the shipped weights are sure of little
+    assert (sure & valid).mean() > 0.3
     assert np.median(np.abs(by_network - by_method)[sure & valid]) < 0.5  # slices
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from pathlib import Path
 from typing import Any
 
 import cv2
@@ -48,6 +49,21 @@ def decoded_picture(data: bytes, flags: int, where: str) -> Any:
         return cv2.imdecode(np.frombuffer(data, np.uint8), flags)
     except cv2.error:
         return None
+
+
+def picture_in(path: Path, flags: int) -> Any:
+    """Return what OpenCV makes of a file, or None where it cannot be read or is no picture.
+
+    Raises
+    ------
+    ContainerError
+        As :func:`is_picture`.
+    """
+    try:
+        data = path.read_bytes()
+    except OSError:
+        return None
+    return decoded_picture(data, flags, str(path))
 
 
 def _size(data: bytes) -> tuple[int, int] | None:

@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 
 from lfstereo.arrays import Float32, Float64
-from lfstereo.container.picture_size import decoded_picture
+from lfstereo.container.picture_size import picture_in
 from lfstereo.errors import ConfigError
 from lfstereo.lightfield.field import LightField
 from lfstereo.options import option
@@ -144,8 +144,7 @@ def _beyond_polygon(x: Float64, y: Float64, radius: float, options: RefocusOptio
 def _from_picture(path: Path | None, count: tuple[int, int]) -> Float32:
     if path is None:
         raise ConfigError("aperture 'picture': found no picture, expected its file; give --aperture-picture")
-    data = path.read_bytes() if path.is_file() else b""
-    picture = decoded_picture(data, cv2.IMREAD_GRAYSCALE, str(path))
+    picture = picture_in(path, cv2.IMREAD_GRAYSCALE)
     if picture is None:
         raise ConfigError(f"{path}: cannot be read as a picture of the aperture; give a PNG or JPEG file")
     small: Float32 = cv2.resize(picture.astype(np.float32) / 255, count[::-1], interpolation=cv2.INTER_AREA)

@@ -51,6 +51,7 @@ _FEWEST_BINS = 16
 _EXPOSURE_SHRINK = 4
 """Reduction at which the pictures are matched to compare their exposure."""
 _AGREE_BINS = 1.5
+"""Difference of the two eyes' disparities below which a place counts as matched."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,6 +161,7 @@ class BinocularNet(nn.Module):
 
 
 def _bins(foci: Tensor) -> int:
+    """Return how many disparities, from 0 px, are searched for slices at these."""
     return max(int(float(foci.max())) + 1 + _BEYOND_PX, _FEWEST_BINS)
 
 

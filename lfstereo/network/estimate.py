@@ -125,7 +125,8 @@ def estimate_from_one_stack(stack: FocalStack, network: Network) -> DisparityMap
     Parameters
     ----------
     stack
-        Its focus disparities set the unit of the answer, whatever they are (px, or slices).
+        Its focus disparities set the unit of the answer, whatever they are (px, or slices). Valid is where the network
+        expects an error of a slice or less, or of :data:`UNSURE_PX` of 96 steps where slices are denser.
     network
         Of the binocular family.
 
@@ -144,7 +145,8 @@ def estimate_from_one_stack(stack: FocalStack, network: Network) -> DisparityMap
     foci = torch.from_numpy((own - own[-1]) / np.float32(per_bin)).to(network.device)
     with torch.inference_mode():
         refined, front = module(encoded_stack(stack, exposure, network), None, foci)
-    found = binocular_map(refined, front, stack.slices.shape[1:3], exposure)
+    slice_px = (FOCUS_BINS - 1) / (len(own) - 1)
+    found = binocular_map(refined, front, stack.slices.shape[1:3], exposure, max(UNSURE_PX, slice_px))
     assert found.uncertainty_px is not None
     return DisparityMap(
         disparity=found.disparity * np.float32(per_bin) + own[-1],
@@ -185,13 +187,15 @@ def estimate_from_pictures(left: Rgb, right: Rgb, near_px: float, network: Netwo
     return binocular_map(refined, front, left.shape[:2], exposure)
 
 
-def binocular_map(refined: Refined, front: Front, size: tuple[int, int], exposure: float) -> DisparityMap:
-    """Cut what the binocular network found to the picture's size, and say where it is sure."""
+def binocular_map(
+    refined: Refined, front: Front, size: tuple[int, int], exposure: float, unsure_px: float = UNSURE_PX
+) -> DisparityMap:
+    """Cut what the binocular network found to the picture's size, and say where it expects ``unsure_px`` or less."""
     error = np.ascontiguousarray(np.exp(cropped(refined.log_error, size)[0]), np.float32)
     sharp = np.moveaxis(cropped(front.sharp, size), 0, -1)
     return DisparityMap(
         disparity=np.maximum(cropped(refined.disparity, size)[0], 0),
-        valid=cv2.medianBlur(error, 5) <= UNSURE_PX,
+        valid=cv2.medianBlur(error, 5) <= unsure_px,
         all_in_focus=np.ascontiguousarray(decode(np.clip(sharp, 0, 1), exposure)),
         uncertainty_px=error,
     )

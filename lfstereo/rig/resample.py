@@ -8,6 +8,7 @@ import numpy as np
 from lfstereo.arrays import Float32, Float64, UInt8
 
 Four = tuple[np.uintp, np.uintp, np.uintp, np.uintp]
+"""Offsets of four samples in a flat view."""
 Shares = tuple[np.float32, np.float32, np.float32, np.float32]
 _FMA = {"contract", "nsz"}
 """Products and sums in one instruction; nothing else is rearranged."""
@@ -68,13 +69,11 @@ def resample_view(
             at_x, at_y = _four(left, columns, 3), _four(top, rows, 3 * columns)
             for channel in range(3):
                 k = np.uintp(channel)
-                total = across[0] * _down(flat, at_x[0] + k, at_y, down) + across[1] * _down(
-                    flat, at_x[1] + k, at_y, down
-                )
-                total += across[2] * _down(flat, at_x[2] + k, at_y, down) + across[3] * _down(
-                    flat, at_x[3] + k, at_y, down
-                )
-                out[row, column, k] = max(total, np.float32(0))
+                near = across[0] * _down(flat, at_x[0] + k, at_y, down)
+                near += across[1] * _down(flat, at_x[1] + k, at_y, down)
+                far = across[2] * _down(flat, at_x[2] + k, at_y, down)
+                far += across[3] * _down(flat, at_x[3] + k, at_y, down)
+                out[row, column, k] = max(near + far, np.float32(0))
 
 
 @numba.njit(nogil=True, fastmath=_FMA)  # type: ignore[untyped-decorator]

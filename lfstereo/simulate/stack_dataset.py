@@ -22,7 +22,7 @@ import cv2
 import numpy as np
 
 from lfstereo.arrays import Bool, Float32, Rgb, UInt8
-from lfstereo.container.picture_size import decoded_picture
+from lfstereo.container.picture_size import picture_in
 from lfstereo.depth.pfm import read_pfm, write_pfm
 from lfstereo.errors import ConfigError, InputError, ShapeError
 from lfstereo.focus.stack import FocalStack
@@ -212,8 +212,7 @@ def _read_slices(folder: Path, name: str, side: str) -> Float32:
 
 
 def _read_depth(path: Path) -> Float32:
-    data = path.read_bytes() if path.is_file() else b""
-    codes = decoded_picture(data, cv2.IMREAD_GRAYSCALE, str(path))
+    codes = picture_in(path, cv2.IMREAD_GRAYSCALE)
     if codes is None:
         raise InputError(f"{path}: not there or no picture; expected 8-bit disparity, 255 = 100 px")
     return np.asarray(codes * np.float32(DEPTH_RANGE_PX / 255), np.float32)

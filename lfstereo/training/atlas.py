@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 
 from lfstereo.arrays import Float32, UInt8
-from lfstereo.container.picture_size import decoded_picture
+from lfstereo.container.picture_size import picture_in
 from lfstereo.errors import ConfigError
 from lfstereo.training.textures import TEXTURE_SIDE, octave_noise, texture_bank
 
@@ -64,7 +64,7 @@ def mixed_bank(seed: int, count: int, folder: str = "") -> Float32:
 def read_atlas(folder: str) -> tuple[UInt8, ...]:
     """Read all pictures of a folder as ``(H, W, 3)`` RGB, the shorter side at least 64 px."""
     paths = sorted(p for p in Path(folder).iterdir() if p.suffix.lower() in _PICTURES) if Path(folder).is_dir() else []
-    found = [decoded_picture(path.read_bytes(), cv2.IMREAD_COLOR, str(path)) for path in paths]
+    found = [picture_in(path, cv2.IMREAD_COLOR) for path in paths]
     pictures = tuple(np.asarray(p[..., ::-1], np.uint8) for p in found if p is not None and min(p.shape[:2]) >= 64)
     if not pictures:
         raise ConfigError(f"{folder}: holds no PNG or JPEG picture of 64 px or more; name a folder of photographs")

@@ -11,7 +11,7 @@ from lfstereo.lightfield.field import LightField
 from lfstereo.lightfield.perspective import QuiltOptions, perspective_view, quilt, quilt_name
 from lfstereo.lightfield.views import horizontal_epi, vertical_epi
 
-TOLERANCE = 2e-4  # linear RGB; OpenCV 4 moves pictures by 32nds of a px
+TOLERANCE = 1e-4  # linear RGB
 
 
 def ramp(slope: float) -> LightField:
