@@ -12,23 +12,23 @@ import argparse
 import statistics
 import time
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import torch
-from torch import nn
 from torch.utils.flop_counter import FlopCounterMode
 
 from lfstereo.conventions import SLICES_DEFAULT
 from lfstereo.network.bdff_net import Architecture, paper_architecture
-from lfstereo.network.binocular_net import BinocularNet
+from lfstereo.network.binocular_net import MULTIPLE, BinocularNet
 from lfstereo.network.blocks import channels_last, fold_batch_norms
 from lfstereo.network.estimate import load_network
-from lfstereo.network.families import AnyArchitecture, build
+from lfstereo.network.families import AnyArchitecture, AnyNetwork, build
 from lfstereo.network.shipped import DEFAULT_MODEL
 
 SIDE = 4096
 NEAR_PX = 100.0
-R32 = {"focus_width": 32, "edof_width": 32, "tail_width": 32, "stereo_width": 128}
+R32: dict[str, Any] = {"focus_width": 32, "edof_width": 32, "tail_width": 32, "stereo_width": 128}
 DESCRIBED: dict[str, AnyArchitecture] = {
     "BDfF-Net R16 as published": paper_architecture(),
     "BDfF-Net R32": Architecture(**R32),
@@ -53,10 +53,12 @@ def seconds_of(work: Callable[[], object], device: str) -> float:
     return time.perf_counter() - started
 
 
-def measure(name: str, module: nn.Module, size: tuple[int, int], device: str, rounds: int, peak: float) -> None:
-    """Print one line."""
+def measure(name: str, module: AnyNetwork, size: tuple[int, int], device: str, rounds: int, peak: float) -> None:
+    """Print one line; height and width are padded to the multiples that the network takes, as in use."""
     draw = torch.Generator().manual_seed(0)
-    left, right = (torch.rand(1, SLICES_DEFAULT, 3, *size, generator=draw).to(device) for _ in range(2))
+    multiple = MULTIPLE if isinstance(module, BinocularNet) else module.architecture.multiple
+    padded = [length + -length % multiple for length in size]
+    left, right = (torch.rand(1, SLICES_DEFAULT, 3, *padded, generator=draw).to(device) for _ in range(2))
     foci = torch.from_numpy(np.linspace(NEAR_PX, 0, SLICES_DEFAULT, dtype=np.float32)).to(device)
 
     @torch.inference_mode()
