@@ -33,7 +33,8 @@ SLICES = 16
 
 def read_views(folder: Path, numbers: range) -> LightField:
     """Read photographs as a light field of one row of views."""
-    pictures = [cv2.imread(str(folder / f"im{n}.ppm"), cv2.IMREAD_COLOR) for n in numbers]
+    paths = [folder / f"im{n}.ppm" for n in numbers]
+    pictures = [cv2.imread(str(path), cv2.IMREAD_COLOR) if path.is_file() else None for path in paths]
     if any(picture is None for picture in pictures):
         raise SystemExit(f"{folder}: im0.ppm to im8.ppm expected; give the folder of one of the nine-view scenes")
     views = srgb_to_linear(np.stack([picture[..., ::-1] for picture in pictures if picture is not None]))
