@@ -31,7 +31,7 @@ STORAGE_MB_S = (100.0, 1000.0)
 """A disk shared over gigabit Ethernet, and a small parallel file system."""
 WORKERS = (1, 2, 10, 100, 1000)
 PAIRS_PER_WORKER = 20
-_START = "from lfstereo.batch import work; work._HELD.network('binocular-v2', 'cpu')"
+_START = "from lfstereo.batch import work; work._HELD.network('binocular-v3', 'cpu')"
 _EMPTY_JOBS = 200
 _LFSTEREO = [sys.executable, "-m", "lfstereo"]
 

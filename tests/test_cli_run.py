@@ -96,7 +96,7 @@ def test_writes_everything(result: Path) -> None:
     assert len(cloud.points_m) == record["summary"]["points"] > 100
     assert 0.3 < float(np.median(cloud.points_m[:, 2])) < 2.0
     accepted = {"any_zoom": False, "any_camera": False}
-    assert record["run"] == {"slices": 16, "model": "binocular-v2", "device": "auto"} | accepted
+    assert record["run"] == {"slices": 16, "model": "binocular-v3", "device": "auto"} | accepted
     assert len(record["sha256"]["weights"]) == 64
     assert record["error"]["lfstereo"]["mae_px"] < SMALL_MAE_PX
     assert "SIM0000" not in (result / "run.toml").read_text()

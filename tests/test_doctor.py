@@ -26,7 +26,7 @@ def test_command_says_ready(capsys: pytest.CaptureFixture[str], tmp_path: Path) 
     assert main(["doctor", "--json", "-o", str(tmp_path / "not" / "yet")]) == 0
     told = json.loads(capsys.readouterr().out)
     assert told["ready"]
-    assert {"python", "numpy", "torch", "weights binocular-v2", "cache", "ffmpeg", "disk"} <= {
+    assert {"python", "numpy", "torch", "weights binocular-v3", "cache", "ffmpeg", "disk"} <= {
         finding["name"] for finding in told["findings"]
     }
 
@@ -69,7 +69,7 @@ def test_packages_without_packaging(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_weights(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     for name, damage in (("good", None), ("changed", b"x"), ("gone", b"")):
-        shutil.copytree(asset_folder("models") / "binocular-v2", tmp_path / name)
+        shutil.copytree(asset_folder("models") / "binocular-v3", tmp_path / name)
         weights = tmp_path / name / "weights.safetensors"
         if damage == b"":
             weights.unlink()

@@ -1,8 +1,8 @@
 """The binocular focus volume: both cues on one disparity axis, for any number of slices.
 
 1. Every slice is scored for focus by the same weights; the scores weigh the slices into an all-in-focus image per eye.
-2. The right image is brought to the exposure of the left one. Each pixel of both gets a descriptor, learnt and census
-   together; the products of the two eyes' descriptors at every disparity say how well they match.
+2. The right image is brought to the exposure of the left one. How alike two pixels look, and how well their learnt
+   descriptors agree, says at every disparity how well the eyes match.
 3. What a disparity lacks in match and what it lacks in focus are added in one volume over (y, x, d), in which
    slice k stands at its own disparity, and aggregated along eight paths.
 4. A U-Net with the sharp image at hand decides what to trust, fills what only one eye sees, corrects, and tells
@@ -24,13 +24,14 @@ import torch.nn.functional as F
 from torch import Tensor, nn
 
 from lfstereo.arrays import Float32
+from lfstereo.network.appearance import appearance_vectors
 from lfstereo.network.census import census_vectors
 from lfstereo.network.clues import clue_maps, focus_disparity
 from lfstereo.network.descriptor_net import DescriptorNet
 from lfstereo.network.penalties import Penalties
 from lfstereo.network.photometry import fitted_light
 from lfstereo.network.refine_net import Refined, RefineNet
-from lfstereo.network.semiglobal_torch import Matched, aggregate, read_out, volume_energy
+from lfstereo.network.semiglobal_torch import Matched, aggregate, focus_slack, read_out, volume_energy
 from lfstereo.network.slice_scores import Focused, SliceScores
 from lfstereo.network.volume import warp_right
 from lfstereo.options import option
@@ -72,8 +73,8 @@ class Seen:
     """Left eye."""
     other: Tensor | None
     """``(1, 3, H, W)`` sharp image of the right eye in the left one's exposure, if there is one."""
-    matched: Matched
-    """Descriptors of both eyes, the left ones weighted; ``None`` where there is one eye alone."""
+    matched: Matched | None
+    """What the eyes compare; ``None`` where there is one eye alone."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,9 +82,9 @@ class Front:
     """What stands before the refinement."""
 
     clues: Tensor
-    """``(B, 15, H, W)``, see :func:`lfstereo.network.clues.clue_maps`."""
+    """``(B, 16, H, W)``, see :func:`lfstereo.network.clues.clue_maps`."""
     offers: Tensor
-    """``(B, 3, H, W)`` disparities in px to choose from."""
+    """``(B, 4, H, W)`` disparities in px to choose from."""
     sharp: Tensor
     """``(B, 3, H, W)`` all-in-focus image of the left eye, 0 to 1."""
 
@@ -130,9 +131,9 @@ class BinocularNet(nn.Module):
         other = self._in_left_light(focused.sharp, self.slices(right).sharp, foci)
         both = torch.cat((focused.sharp, other))
         learnt, sharpness = self.descriptors(both)
-        census = census_vectors(both)
-        first = torch.cat((sharpness[0] * learnt[0], self.penalties.census * census[0]))
-        return Seen(focused, other, (first, torch.cat((learnt[1], census[1]))))
+        looks = appearance_vectors(both, self.penalties.appearance)
+        described = (self.penalties.learnt * sharpness[0] * learnt[0], learnt[1])
+        return Seen(focused, other, Matched(described, (looks[0], looks[1])))
 
     def _in_left_light(self, sharp: Tensor, other: Tensor, foci: Tensor) -> Tensor:
         """Return the right picture in the exposure of the left one, as census matches of small pictures tell it."""
@@ -140,7 +141,7 @@ class BinocularNet(nn.Module):
         census = census_vectors(torch.cat((small, small_other)))
         bins = max(_bins(foci) // _EXPOSURE_SHRINK + 1, _FEWEST_BINS)
         read = _readings(
-            (self.penalties.census * census[0], census[1]), None, foci, bins, small[0].mean(0), self.penalties
+            Matched((self.penalties.census * census[0], census[1])), None, foci, bins, small[0].mean(0), self.penalties
         )
         warped = warp_right(small_other, read[None, :1])
         counted = (read[4] >= 0) & (read[4] < _AGREE_BINS)
@@ -166,7 +167,7 @@ def _bins(foci: Tensor) -> int:
 
 
 def _readings(
-    matched: Matched, scores: Tensor | None, foci: Tensor, bins: int, guide: Tensor, weights: Penalties
+    matched: Matched | None, scores: Tensor | None, foci: Tensor, bins: int, guide: Tensor, weights: Penalties
 ) -> Tensor:
     """Aggregate the cues over disparities 0 to ``bins - 1`` and read out ``(6, H, W)``."""
     compiled = guide.device.type == "cpu" and find_spec("numba") is not None
@@ -174,26 +175,30 @@ def _readings(
 
 
 def _torch_readings(
-    matched: Matched, scores: Tensor | None, foci: Tensor, bins: int, guide: Tensor, weights: Penalties
+    matched: Matched | None, scores: Tensor | None, foci: Tensor, bins: int, guide: Tensor, weights: Penalties
 ) -> Tensor:
     energy = volume_energy(matched, scores, foci, bins, weights)
     return read_out(aggregate(energy, guide, weights), energy)
 
 
 def _compiled_readings(
-    matched: Matched, scores: Tensor | None, foci: Tensor, bins: int, guide: Tensor, weights: Penalties
+    matched: Matched | None, scores: Tensor | None, foci: Tensor, bins: int, guide: Tensor, weights: Penalties
 ) -> Tensor:
     from lfstereo.network import semiglobal
 
     height, width = guide.shape
     energy = np.zeros((height, width, bins), np.float32)
-    if matched is not None:
-        left, right = _pixels(matched[0]), np.ascontiguousarray(_pixels(matched[1])[:, ::-1])
-        semiglobal.match_energy(left, right, weights.match_ceiling, weights.unseen, energy)
-    if scores is not None:
-        places = foci.numpy().astype(np.float32)
-        semiglobal.add_focus_energy(_pixels(scores), places, weights.focus_weight, weights.focus_ceiling, energy)
     sums = np.empty((2, *energy.shape), np.float32)
+    if matched is not None:
+        differing = sums[0, :0]
+        if matched.looks is not None:
+            differing = sums[0]
+            semiglobal.differences(_pixels(matched.looks[0]), _mirrored(matched.looks[1]), differing)
+        left, right = _pixels(matched.described[0]), _mirrored(matched.described[1])
+        semiglobal.match_energy(left, right, differing, weights.match_ceiling, weights.unseen, energy)
+    if scores is not None:
+        places, slack = foci.numpy().astype(np.float32), focus_slack(matched, weights)
+        semiglobal.add_focus_energy(_pixels(scores), places, weights.focus_weight, slack, weights.focus_ceiling, energy)
     level = np.ascontiguousarray(guide.numpy())
     semiglobal.aggregate(energy, level, weights.small, weights.large, weights.edge, sums)
     readings = np.empty((READINGS, height, width), np.float32)
@@ -204,3 +209,8 @@ def _compiled_readings(
 def _pixels(maps: Tensor) -> Float32:
     """``(C, H, W)`` to a contiguous ``(H, W, C)``."""
     return np.ascontiguousarray(maps.permute(1, 2, 0).numpy())
+
+
+def _mirrored(maps: Tensor) -> Float32:
+    """``(C, H, W)`` to a contiguous ``(H, W, C)``, turned round in x."""
+    return np.ascontiguousarray(_pixels(maps)[:, ::-1])

@@ -9,6 +9,8 @@ from torch import Tensor
 from lfstereo.network.volume import mode_mean, warp_right
 
 _FULL_PX = 100.0
+_CONFIRMED_PX = 1.5
+"""Difference of the two eyes' disparities below which they confirm each other."""
 
 
 def focus_disparity(scores: Tensor, foci: Tensor) -> tuple[Tensor, Tensor]:
@@ -32,6 +34,39 @@ def focus_disparity(scores: Tensor, foci: Tensor) -> tuple[Tensor, Tensor]:
     return found[:, :1], found[:, 1:]
 
 
+def background_filled(best: Tensor, left_right: Tensor) -> Tensor:
+    """Fill what the right eye does not confirm from the two confirmed pixels beside it in the row: the farther one.
+
+    References
+    ----------
+    Hirschmüller, "Stereo processing by semiglobal matching and mutual information" (2008), section 2.5: occlusions.
+
+    Parameters
+    ----------
+    best
+        ``(B, 1, H, W)`` px.
+    left_right
+        ``(B, 1, H, W)`` by how much the right eye's own disparity differs, px; -1 where it cannot see the place.
+
+    Examples
+    --------
+    >>> best, confirmed = torch.tensor([[[[2.0, 9.0, 8.0, 5.0]]]]), torch.tensor([[[[0.0, 7.0, -1.0, 0.5]]]])
+    >>> background_filled(best, confirmed).flatten().tolist()
+    [2.0, 2.0, 2.0, 5.0]
+    """
+    width = best.shape[-1]
+    confirmed = (left_right >= 0) & (left_right < _CONFIRMED_PX)
+    x = torch.arange(width, device=best.device).expand(best.shape)
+    before = torch.where(confirmed, x, -1).cummax(-1).values
+    after = torch.where(confirmed, x, width).flip(-1).cummin(-1).values.flip(-1)
+    far = torch.full_like(best, torch.inf)
+    filled = torch.minimum(
+        torch.where(before >= 0, best.gather(-1, before.clamp(min=0)), far),
+        torch.where(after < width, best.gather(-1, after.clamp(max=width - 1)), far),
+    )
+    return torch.where(filled.isinf(), best, filled)
+
+
 def clue_maps(
     sharp: Tensor, readings: Tensor, focus: tuple[Tensor, Tensor] | None, other: Tensor | None
 ) -> tuple[Tensor, Tensor]:
@@ -51,12 +86,13 @@ def clue_maps(
     Returns
     -------
     tuple
-        Clues ``(B, 15, H, W)`` and offers ``(B, 3, H, W)``.
+        Clues ``(B, 16, H, W)`` and offers ``(B, 4, H, W)``.
     """
     best, second, margin, energy, left_right, near = torch.chunk(readings, 6, dim=1)
     none = torch.zeros_like(best)
     focused, likely = (best, none) if focus is None else focus
     error = none if other is None else (sharp - warp_right(other, best)).abs().mean(1, keepdim=True)
+    filled = best if other is None else background_filled(best, left_right)
     unseen = (left_right < 0).to(best.dtype)
     stereo = none if other is None else none + 1
     clues = torch.cat(
@@ -71,10 +107,11 @@ def clue_maps(
             near,
             (focused - best).clamp(-30, 30) / 30,
             likely,
+            (filled - best).clamp(-30, 30) / 30,
             4 * error,
             none if focus is None else none + 1,
             stereo,
         ),
         dim=1,
     )
-    return clues, torch.cat((best, second, focused), dim=1)
+    return clues, torch.cat((best, second, focused, filled), dim=1)

@@ -48,7 +48,7 @@ def load_network(name: str | Path = DEFAULT_MODEL, device: Literal["auto", "cpu"
     Parameters
     ----------
     name
-        Such as ``"binocular-v2"``.
+        Such as ``"binocular-v3"``.
     device
         ``"auto"`` takes CUDA where there is any.
 

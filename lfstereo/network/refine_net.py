@@ -24,10 +24,10 @@ from torch import Tensor, nn
 
 from lfstereo.network.blocks import ConvBlock, initialise
 
-CLUES = 15
+CLUES = 16
 """Channels that the U-Net looks at, see :func:`lfstereo.network.clues.clue_maps`."""
-OFFERS = 3
-"""Disparities on offer: the best, the second best, that of focus alone."""
+OFFERS = 4
+"""Disparities on offer: the best, the second best, that of focus alone, that of the background beside a gap."""
 REACH_PX = (32, 16, 8, 4, 2, 1)
 _CORRECTION_PX = 2.0
 _NEIGHBOURS = tuple((dy, dx) for dy in (-1, 0, 1) for dx in (-1, 0, 1))
@@ -46,7 +46,7 @@ class Refined:
 
 
 class RefineNet(nn.Module):
-    """Clues ``(B, 15, H, W)`` and offers ``(B, 3, H, W)`` in px to a disparity; ``H`` and ``W`` multiples of 32.
+    """Clues ``(B, 16, H, W)`` and offers ``(B, 4, H, W)`` in px to a disparity; ``H`` and ``W`` multiples of 32.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ class RefineNet(nn.Module):
         with torch.no_grad():
             self.affinity.weight.mul_(0.2)
             self.tell.weight.mul_(0.2)
-            self.tell.bias[:] = torch.tensor([2.0, -1, -1, 1, 0, 0])  # type: ignore[index]
+            self.tell.bias[:] = torch.tensor([2.0, -1, -1, -1, 1, 0, 0])  # type: ignore[index]
             middle = self.affinity.bias.view(len(REACH_PX), len(_NEIGHBOURS))  # type: ignore[union-attr]
             middle[:, _NEIGHBOURS.index((0, 0))] = 4.0
 

@@ -22,15 +22,13 @@ _FAR = np.float32(1e9)
 
 
 @numba.njit(cache=True, nogil=True, fastmath=True, parallel=True)  # type: ignore[untyped-decorator]
-def match_energy(left: Float32, right: Float32, ceiling: float, unseen: float, out: Float32) -> None:
-    """Fill ``(H, W, D)`` with what each disparity's match lacks to the best match of the pixel.
+def differences(left: Float32, right: Float32, out: Float32) -> None:
+    """Fill ``(H, W, D)`` with the sum of absolute differences of each disparity's two pixels; 0 where one is unseen.
 
     Parameters
     ----------
     left, right
-        ``(H, W, C)`` descriptors; ``right`` is given mirrored in x, so that disparities follow each other.
-    ceiling, unseen
-        As in :class:`lfstereo.network.penalties.Penalties`.
+        ``(H, W, C)``; ``right`` is given mirrored in x, so that disparities follow each other.
     out
         ``(H, W, D)`` float32.
     """
@@ -44,6 +42,45 @@ def match_energy(left: Float32, right: Float32, ceiling: float, unseen: float, o
         for x in range(width):
             seen = min(bins, x + 1)
             start = width - 1 - x
+            sums = out[y, x]
+            for d in range(bins):
+                sums[d] = 0.0
+            for c in range(channels):
+                value, line = left[y, x, c], turned[c, start : start + bins]
+                for d in range(seen):
+                    sums[d] += abs(value - line[d])
+
+
+@numba.njit(cache=True, nogil=True, fastmath=True, parallel=True)  # type: ignore[untyped-decorator]
+def match_energy(
+    left: Float32, right: Float32, differing: Float32, ceiling: float, unseen: float, out: Float32
+) -> None:
+    """Fill ``(H, W, D)`` with what each disparity's match lacks to the best match of the pixel.
+
+    Parameters
+    ----------
+    left, right
+        ``(H, W, C)`` descriptors; ``right`` is given mirrored in x, so that disparities follow each other.
+    differing
+        ``(H, W, D)`` of :func:`differences`, whose mean over the seen ones of 3 x 3 px counts against a match; or an
+        empty array.
+    ceiling, unseen
+        As in :class:`lfstereo.network.penalties.Penalties`.
+    out
+        ``(H, W, D)`` float32.
+    """
+    height, width, channels = left.shape
+    bins = out.shape[2]
+    for y in numba.prange(height):
+        turned = np.empty((channels, width + bins), np.float32)
+        for x in range(width):
+            for c in range(channels):
+                turned[c, x] = right[y, x, c]
+        top, bottom = max(y - 1, 0), min(y + 2, height)
+        columns = np.zeros((3, bins), np.float32)
+        for x in range(width):
+            seen = min(bins, x + 1)
+            start = width - 1 - x
             scores = out[y, x]
             for d in range(bins):
                 scores[d] = 0.0
@@ -51,6 +88,21 @@ def match_energy(left: Float32, right: Float32, ceiling: float, unseen: float, o
                 weight, line = left[y, x, c], turned[c, start : start + bins]
                 for d in range(bins):
                     scores[d] += weight * line[d]
+            if differing.size > 0:
+                for ahead in range(0 if x == 0 else 1, 2):
+                    column = columns[(x + ahead) % 3]
+                    for d in range(bins):
+                        column[d] = 0.0
+                    if x + ahead < width:
+                        for row in range(top, bottom):
+                            beside = differing[row, x + ahead]
+                            for d in range(bins):
+                                column[d] += beside[d]
+                last = min(x + 1, width - 1)
+                one, two, three = columns[0], columns[1], columns[2]
+                for d in range(seen):
+                    count = (last - max(x - 1, d) + 1) * (bottom - top)
+                    scores[d] -= (one[d] + two[d] + three[d]) / count
             best = scores[0]
             for d in range(seen):
                 best = max(best, scores[d])
@@ -61,7 +113,9 @@ def match_energy(left: Float32, right: Float32, ceiling: float, unseen: float, o
 
 
 @numba.njit(cache=True, nogil=True, fastmath=True, parallel=True)  # type: ignore[untyped-decorator]
-def add_focus_energy(scores: Float32, foci: Float32, weight: float, ceiling: float, energy: Float32) -> None:
+def add_focus_energy(
+    scores: Float32, foci: Float32, weight: float, slack: float, ceiling: float, energy: Float32
+) -> None:
     """Add to ``(H, W, D)`` what each disparity's focus lacks to the best in focus.
 
     Parameters
@@ -70,7 +124,7 @@ def add_focus_energy(scores: Float32, foci: Float32, weight: float, ceiling: flo
         ``(h, w, K)`` logits of the slices, each for a block of 4 x 4 px; interpolated between blocks.
     foci
         ``(K,)`` position of the slices on the axis of ``energy``, falling; beyond them the end slice's score holds.
-    weight, ceiling
+    weight, slack, ceiling
         As in :class:`lfstereo.network.penalties.Penalties`.
     energy
         ``(H, W, D)`` float32, added to in place.
@@ -106,7 +160,7 @@ def add_focus_energy(scores: Float32, foci: Float32, weight: float, ceiling: flo
             for d in range(bins):
                 k = lower[d]
                 value = line[k] + share[d] * (line[min(k + 1, count - 1)] - line[k])
-                target[d] += weight * min(best - value, ceiling)
+                target[d] += weight * min(max(best - value - slack, np.float32(0.0)), ceiling)
 
 
 @numba.njit(cache=True, nogil=True, fastmath=True)  # type: ignore[untyped-decorator]

@@ -5,6 +5,8 @@ The same energies, paths and read-out, to rounding; ``tests/network/test_semiglo
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import torch
 import torch.nn.functional as F
 from torch import Tensor
@@ -14,12 +16,18 @@ from lfstereo.network.penalties import Penalties
 _FAR = 1e9
 
 
-Matched = tuple[Tensor, Tensor] | None
-"""Left and right descriptors ``(C, H, W)``, whose product is the match; ``None`` without the stereo cue."""
+@dataclass(frozen=True, slots=True)
+class Matched:
+    """What is compared of the two eyes, left and right each ``(C, H, W)``."""
+
+    described: tuple[Tensor, Tensor]
+    """Descriptors, whose product says how well two pixels match."""
+    looks: tuple[Tensor, Tensor] | None = None
+    """Appearance, whose absolute difference counts against it."""
 
 
 def volume_energy(
-    descriptors: Matched,
+    matched: Matched | None,
     scores: Tensor | None,
     foci: Tensor,
     bins: int,
@@ -29,8 +37,8 @@ def volume_energy(
 
     Parameters
     ----------
-    descriptors
-        Left and right ``(C, H, W)``; ``None`` without the stereo cue.
+    matched
+        What the eyes compare; ``None`` without the stereo cue.
     scores
         ``(K, H / 4, W / 4)`` of the slices; ``None`` without the focus cue.
     foci
@@ -41,32 +49,42 @@ def volume_energy(
         Of the cues.
     """
     total: Tensor | None = None
-    if descriptors is not None:
-        total = _match_energy(*descriptors, bins, weights)
+    if matched is not None:
+        total = _match_energy(matched, bins, weights)
     if scores is not None:
-        focus = _focus_energy(scores, foci, bins, weights)
+        focus = _focus_energy(scores, foci, bins, weights, focus_slack(matched, weights))
         total = focus if total is None else total + focus
     assert total is not None
     return total
 
 
-def _match_energy(left: Tensor, right: Tensor, bins: int, weights: Penalties) -> Tensor:
+def focus_slack(matched: Matched | None, weights: Penalties) -> float:
+    """Return what a slice's score may lack for nothing: nothing where focus is all there is."""
+    return 0.0 if matched is None else weights.focus_slack
+
+
+def _match_energy(matched: Matched, bins: int, weights: Penalties) -> Tensor:
+    left, right = matched.described
     _, height, width = left.shape
     products = left.new_full((height, width, bins), -_FAR)
     for d in range(min(bins, width)):
         products[:, d:, d] = (left[:, :, d:] * right[:, :, : width - d]).sum(0)
+        if matched.looks is not None:
+            look, other = matched.looks
+            differing = (look[:, :, d:] - other[:, :, : width - d]).abs().sum(0)
+            products[:, d:, d] -= F.avg_pool2d(differing[None], 3, 1, 1, count_include_pad=False)[0]
     lacking = products.amax(2, keepdim=True) - products
     return torch.where(products > -_FAR, lacking.clamp(max=weights.match_ceiling), weights.unseen)
 
 
-def _focus_energy(scores: Tensor, foci: Tensor, bins: int, weights: Penalties) -> Tensor:
+def _focus_energy(scores: Tensor, foci: Tensor, bins: int, weights: Penalties, slack: float) -> Tensor:
     fine = F.interpolate(scores[None], scale_factor=4, mode="bilinear", align_corners=False)[0].permute(1, 2, 0)
     values = torch.arange(bins, device=foci.device, dtype=foci.dtype)
     lower = (torch.searchsorted(-foci, -values, right=False) - 1).clamp(0, len(foci) - 2)
     share = ((foci[lower] - values) / (foci[lower] - foci[lower + 1])).clamp(0, 1)
     between = fine[..., lower] * (1 - share) + fine[..., lower + 1] * share
-    lacking = fine.amax(2, keepdim=True) - between
-    return weights.focus_weight * lacking.clamp(max=weights.focus_ceiling)
+    lacking = fine.amax(2, keepdim=True) - between - slack
+    return weights.focus_weight * lacking.clamp(0, weights.focus_ceiling)
 
 
 def aggregate(energy: Tensor, guide: Tensor, weights: Penalties) -> Tensor:

@@ -9,7 +9,7 @@ from lfstereo.errors import AssetError
 
 CARD = "card.toml"
 WEIGHTS = "weights.safetensors"
-DEFAULT_MODEL = "binocular-v2"
+DEFAULT_MODEL = "binocular-v3"
 """The model used where none is named."""
 
 

@@ -32,9 +32,9 @@ class FrontBatch:
     """What the refinement is given, and the truth."""
 
     clues: Tensor
-    """``(B, 15, H, W)``."""
+    """``(B, 16, H, W)``."""
     offers: Tensor
-    """``(B, 3, H, W)`` px."""
+    """``(B, 4, H, W)`` px."""
     disparity: Tensor
     """``(B, 1, H, W)`` disparity / 100 px."""
     valid: Tensor
@@ -42,7 +42,7 @@ class FrontBatch:
 
 
 def open_fronts(folder: Path, pool: Pool) -> tuple[NDArray[np.float16], NDArray[np.uint8]]:
-    """Open or create the cache of a pool: ``(N, 3, 18, H, W)`` maps and ``(N,)`` which are ready."""
+    """Open or create the cache of a pool: ``(N, 3, 20, H, W)`` maps and ``(N,)`` which are ready."""
     folder.mkdir(parents=True, exist_ok=True)
     count, _, height, width = pool.disparity.shape
     found = []

@@ -271,7 +271,7 @@ def safetensors(data: bytes) -> None:
 
 OPTIONS_TOML = b"""[run]
 slices = 16
-model = "binocular-v2"
+model = "binocular-v3"
 device = "auto"
 any_zoom = false
 [batch]

@@ -7,6 +7,7 @@ import torch
 
 from lfstereo.errors import ConfigError, ShapeError
 from lfstereo.focus.stack import FocalStack
+from lfstereo.network.appearance import appearance_vectors
 from lfstereo.network.binocular_net import BinocularArchitecture, BinocularNet
 from lfstereo.network.blocks import channels_last, fold_batch_norms
 from lfstereo.network.card import ModelCard, Training
@@ -73,6 +74,16 @@ def test_census_says_what_outshines_what() -> None:
     assert float((vectors * darker).sum(1).median()) > 0.9
     assert float((vectors * census_vectors(1 - picture)).sum(1).max()) < 0
     assert not census_vectors(torch.full((1, 3, 8, 8), 0.3)).any()
+
+
+def test_appearance_is_brightness_and_bounded_slopes() -> None:
+    ramp = torch.arange(8.0).expand(1, 3, 6, 8) * torch.tensor([0.001, 0.002, 0.1]).view(1, 3, 1, 1)
+    looks = appearance_vectors(ramp, 2.0)
+    assert torch.allclose(looks[:, :3], 2 * ramp)
+    inside = looks[0, 3:, 1:-1, 1:-1].flatten(1)
+    wanted = 2 * torch.tensor([0.008, 0.016, 0.06, 0, 0, 0]).view(6, 1)  # Sobel: eight times the step; at most 0.06
+    assert torch.allclose(inside, wanted.expand_as(inside), atol=1e-6)
+    assert torch.allclose(appearance_vectors(ramp.mT, 2.0)[0, 6:, 1:-1, 1:-1].flatten(1), inside[:3], atol=1e-6)
 
 
 def test_exposure_of_one_picture_is_found_from_the_other() -> None:

@@ -10,6 +10,7 @@ import torch
 from lfstereo.cli.main import main
 from lfstereo.errors import ConfigError
 from lfstereo.network.binocular_net import BinocularArchitecture, BinocularNet
+from lfstereo.network.refine_net import CLUES, OFFERS
 from lfstereo.network.weights import load_model
 from lfstereo.training.batches import PoolBatches
 from lfstereo.training.binocular_losses import seen_by_both, vary_slices
@@ -104,7 +105,7 @@ def test_fronts_are_cached_whole_and_cropped_alike(pool: Path, fronts: Path) -> 
     assert source.ready.tolist() == [1, 1, 1]
     first, again, other = source(3), source(3), source(4)
     assert torch.equal(first.clues, again.clues) and not torch.equal(first.clues, other.clues)
-    assert tuple(first.clues.shape) == (2, 15, 32, 96) and tuple(first.offers.shape) == (2, 3, 32, 96)
+    assert tuple(first.clues.shape) == (2, CLUES, 32, 96) and tuple(first.offers.shape) == (2, OFFERS, 32, 96)
     assert float(first.disparity.max()) <= 1.02 and float(first.offers.max()) > 1.02  # hundreds of px, and px
 
 
