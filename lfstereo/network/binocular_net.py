@@ -26,7 +26,7 @@ from torch import Tensor, nn
 from lfstereo.arrays import Float32
 from lfstereo.network.appearance import appearance_vectors
 from lfstereo.network.census import census_vectors
-from lfstereo.network.clues import clue_maps, focus_disparity
+from lfstereo.network.clues import clue_maps, confirmed, focus_disparity
 from lfstereo.network.descriptor_net import DescriptorNet
 from lfstereo.network.penalties import Penalties
 from lfstereo.network.photometry import fitted_light
@@ -51,8 +51,6 @@ _BEYOND_PX = 4
 _FEWEST_BINS = 16
 _EXPOSURE_SHRINK = 4
 """Reduction at which the pictures are matched to compare their exposure."""
-_AGREE_BINS = 1.5
-"""Difference of the two eyes' disparities below which a place counts as matched."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,8 +142,7 @@ class BinocularNet(nn.Module):
             Matched((self.penalties.census * census[0], census[1])), None, foci, bins, small[0].mean(0), self.penalties
         )
         warped = warp_right(small_other, read[None, :1])
-        counted = (read[4] >= 0) & (read[4] < _AGREE_BINS)
-        gain, offset = fitted_light(small[0].flatten(1), warped[0].flatten(1), counted.flatten())
+        gain, offset = fitted_light(small[0].flatten(1), warped[0].flatten(1), confirmed(read[4]).flatten())
         return (gain.view(1, 3, 1, 1) * other + offset.view(1, 3, 1, 1)).clamp(0, 1)
 
     @torch.no_grad()

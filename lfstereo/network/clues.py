@@ -9,7 +9,7 @@ from torch import Tensor
 from lfstereo.network.volume import mode_mean, warp_right
 
 _FULL_PX = 100.0
-_CONFIRMED_PX = 1.5
+_CONFIRMED_BINS = 1.5
 """Difference of the two eyes' disparities below which they confirm each other."""
 
 
@@ -34,6 +34,17 @@ def focus_disparity(scores: Tensor, foci: Tensor) -> tuple[Tensor, Tensor]:
     return found[:, :1], found[:, 1:]
 
 
+def confirmed(left_right: Tensor) -> Tensor:
+    """Tell where the right eye's own disparity agrees.
+
+    Parameters
+    ----------
+    left_right
+        Of any shape: by how much it differs, in steps of the volume; -1 where the right eye cannot see the place.
+    """
+    return (left_right >= 0) & (left_right < _CONFIRMED_BINS)
+
+
 def background_filled(best: Tensor, left_right: Tensor) -> Tensor:
     """Fill what the right eye does not confirm from the two confirmed pixels beside it in the row: the farther one.
 
@@ -50,15 +61,15 @@ def background_filled(best: Tensor, left_right: Tensor) -> Tensor:
 
     Examples
     --------
-    >>> best, confirmed = torch.tensor([[[[2.0, 9.0, 8.0, 5.0]]]]), torch.tensor([[[[0.0, 7.0, -1.0, 0.5]]]])
-    >>> background_filled(best, confirmed).flatten().tolist()
+    >>> best, left_right = torch.tensor([[[[2.0, 9.0, 8.0, 5.0]]]]), torch.tensor([[[[0.0, 7.0, -1.0, 0.5]]]])
+    >>> background_filled(best, left_right).flatten().tolist()
     [2.0, 2.0, 2.0, 5.0]
     """
     width = best.shape[-1]
-    confirmed = (left_right >= 0) & (left_right < _CONFIRMED_PX)
+    sure = confirmed(left_right)
     x = torch.arange(width, device=best.device).expand(best.shape)
-    before = torch.where(confirmed, x, -1).cummax(-1).values
-    after = torch.where(confirmed, x, width).flip(-1).cummin(-1).values.flip(-1)
+    before = torch.where(sure, x, -1).cummax(-1).values
+    after = torch.where(sure, x, width).flip(-1).cummin(-1).values.flip(-1)
     far = torch.full_like(best, torch.inf)
     filled = torch.minimum(
         torch.where(before >= 0, best.gather(-1, before.clamp(min=0)), far),

@@ -21,6 +21,17 @@ from lfstereo.arrays import Float32
 _FAR = np.float32(1e9)
 
 
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _channels_first(row: Float32, beyond: int) -> Float32:
+    """``(W, C)`` to ``(C, W + beyond)``, so that a run of disparities lies together; 0 beyond the row."""
+    width, channels = row.shape
+    lines = np.zeros((channels, width + beyond), np.float32)
+    for x in range(width):
+        for c in range(channels):
+            lines[c, x] = row[x, c]
+    return lines
+
+
 @numba.njit(cache=True, nogil=True, fastmath=True, parallel=True)  # type: ignore[untyped-decorator]
 def differences(left: Float32, right: Float32, out: Float32) -> None:
     """Fill ``(H, W, D)`` with the sum of absolute differences of each disparity's two pixels; 0 where one is unseen.
@@ -35,10 +46,7 @@ def differences(left: Float32, right: Float32, out: Float32) -> None:
     height, width, channels = left.shape
     bins = out.shape[2]
     for y in numba.prange(height):
-        turned = np.empty((channels, width + bins), np.float32)
-        for x in range(width):
-            for c in range(channels):
-                turned[c, x] = right[y, x, c]
+        turned = _channels_first(right[y], bins)
         for x in range(width):
             seen = min(bins, x + 1)
             start = width - 1 - x
@@ -72,10 +80,7 @@ def match_energy(
     height, width, channels = left.shape
     bins = out.shape[2]
     for y in numba.prange(height):
-        turned = np.empty((channels, width + bins), np.float32)
-        for x in range(width):
-            for c in range(channels):
-                turned[c, x] = right[y, x, c]
+        turned = _channels_first(right[y], bins)
         top, bottom = max(y - 1, 0), min(y + 2, height)
         columns = np.zeros((3, bins), np.float32)
         for x in range(width):
